@@ -1,0 +1,273 @@
+"""One elastic body as matrices: stiffness, loads, held and driven degrees of freedom, contact nodes.
+
+Linear finite elements of scikit-fem on the mesh that a Part gives. Every integral carries the weight of the scene's
+kind (thickness, 2 pi r, mirror images), so that forces and areas are those of the whole body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import skfem
+from scipy.sparse.csgraph import connected_components
+from skfem.helpers import dot
+
+from contactopt.errors import InputError
+from contactopt.scene import Material, Part, Plate, Scene, Traction
+
+ELEMENTS = {
+    "RefLine": skfem.ElementLineP1,
+    "RefTri": skfem.ElementTriP1,
+    "RefQuad": skfem.ElementQuad1,
+    "RefTet": skfem.ElementTetP1,
+    "RefHex": skfem.ElementHex1,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A discretised Part with n displacement unknowns, of which those in `free` are not prescribed.
+
+    A       (n, n) sparse stiffness; not singular on the free unknowns
+    load    (n,) nodal forces of tractions and body forces
+    lift    (n,) prescribed displacements of the supports, 0 elsewhere
+    motion  (n, p) unit motions of the p plate components that may move; zero on free unknowns
+    thrust  (p,) total forces on them
+    nodes   (k,) mesh nodes of the candidate contact boundary
+    areas   (k,) nodal areas, the integrals of the shape functions over it
+    normals (dim, k) outward unit normals there, averaged over the facets
+    """
+
+    name: str
+    material: Material
+    basis: skfem.CellBasis
+    weight: tuple[float, bool]
+    A: sp.csr_matrix
+    load: np.ndarray
+    lift: np.ndarray
+    free: np.ndarray
+    motion: np.ndarray
+    thrust: np.ndarray
+    nodes: np.ndarray
+    areas: np.ndarray
+    normals: np.ndarray
+
+    @property
+    def points(self) -> np.ndarray:
+        """Coordinates of the contact nodes, (dim, k)."""
+        return np.asarray(self.basis.mesh.p[:, self.nodes])
+
+    @property
+    def contact_dofs(self) -> np.ndarray:
+        """Displacement unknowns of the contact nodes, (k, dim)."""
+        return np.asarray(self.basis.nodal_dofs[:, self.nodes].T)
+
+
+def weight_at(weight: tuple[float, bool], x: np.ndarray) -> np.ndarray | float:
+    """Measure of the integrals: a constant (thickness, copies), times r in an axisymmetric scene."""
+    factor, axisymmetric = weight
+    return factor * x[0] if axisymmetric else factor
+
+
+def lame(material: Material) -> tuple[float, float]:
+    """Lame's parameters (lambda, G) [stress]."""
+    E, nu = material.E, material.nu
+    return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
+
+
+def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Body:
+    """Mesh and assemble one Part of a Scene; raises InputError for a body that could move freely."""
+    mesh = part.build_mesh(elements, zone)
+    _check_mesh(scene, part, mesh)
+    axisymmetric = scene.kind == "axisymmetric"
+    factor = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}[scene.kind] * scene.copies
+    weight = (factor, axisymmetric)
+    scalar = ELEMENTS[mesh.refdom.__name__]()
+    basis = skfem.Basis(mesh, skfem.ElementVector(scalar), intorder=3 if axisymmetric else 2)
+    A = stiffness(basis, part.material, weight)
+    pieces = connected_components(A, directed=False)[0]
+    if pieces > 1:
+        raise InputError(
+            f"body '{part.name}': its mesh falls into {pieces} pieces; remove nodes that belong to no element, "
+            "merge duplicated nodes, or model each piece as a body of its own."
+        )
+    lift, held, motion, thrust = _constraints(scene, part, basis)
+    _check_rigid_modes(scene, part, basis, held)
+    nodes, areas, normals = _contact(part, mesh, scalar, weight)
+    return Body(
+        part.name,
+        part.material,
+        basis,
+        weight,
+        A,
+        _load(part, basis, weight),
+        lift,
+        np.flatnonzero(~held),
+        motion,
+        thrust,
+        nodes,
+        areas,
+        normals,
+    )
+
+
+def stiffness(basis: skfem.CellBasis, material: Material, weight: tuple[float, bool]) -> sp.csr_matrix:
+    """Elastic stiffness: the integral of sigma(u) : epsilon(v), with the hoop strain u_r / r if axisymmetric.
+
+    With g_ia the derivative of shape function i along a, component a of node i and component b of node j meet in
+    lambda g_ia g_jb + G g_ib g_ja + G (g_i . g_j) delta_ab: one batched matrix product for all elements.
+    """
+    lam, shear = lame(material)
+    dim = basis.mesh.p.shape[0]
+    fields = [basis.basis[i][0] for i in range(0, basis.Nbfun, dim)]  # component 0 of every shape function
+    g = np.stack([np.asarray(f.grad[0]) for f in fields])  # (i, a, element, point)
+    measure = basis.dx * weight_at(weight, basis.global_coordinates().value)
+    g = np.ascontiguousarray(np.moveaxis(g, (2, 0, 1, 3), (0, 1, 2, 3)))  # (element, i, a, point)
+    divergence = g
+    if weight[1]:
+        hoop = np.stack([np.asarray(f.value[0]) for f in fields], axis=1) / basis.global_coordinates().value[0][:, None]
+        divergence = g.copy()
+        divergence[:, :, 0] += hoop
+    K = lam * _pairs(divergence, measure)
+    H = _pairs(g, measure)
+    K += shear * H.transpose(0, 1, 4, 3, 2)
+    gradients = np.einsum("eiaja->eij", H)
+    for a in range(dim):
+        K[:, :, a, :, a] += shear * gradients
+    if weight[1]:
+        K[:, :, 0, :, 0] += 2 * shear * _pairs(hoop[:, :, None], measure)[:, :, 0, :, 0]
+    dofs = basis.element_dofs.T  # (element, i a)
+    n = dofs.shape[1]
+    rows, columns = np.repeat(dofs, n, axis=1).ravel(), np.tile(dofs, n).ravel()
+    return sp.csr_matrix((K.ravel(), (rows, columns)), (basis.N, basis.N))
+
+
+def _pairs(f: np.ndarray, measure: np.ndarray) -> np.ndarray:
+    """Integrals of f_ia f_jb: f (element, i, a, point), measure (element, point) -> (element, i, a, j, b)."""
+    flat = f.reshape(len(f), -1, f.shape[3])
+    return np.asarray((flat * measure[:, None]) @ flat.transpose(0, 2, 1)).reshape(*f.shape[:3], *f.shape[1:3])
+
+
+def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
+    if mesh.p.shape[0] != scene.dim or mesh.refdom.__name__ not in ELEMENTS:
+        raise InputError(
+            f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension {scene.dim} made of "
+            f"triangles, quadrilaterals, tetrahedra or hexahedra; got {type(mesh).__name__}."
+        )
+    if not np.all(np.isfinite(mesh.p)):
+        raise InputError(f"body '{part.name}': the mesh has a node whose coordinates are not finite numbers.")
+    if scene.kind == "axisymmetric" and mesh.p[0].min() < -1e-12 * np.ptp(mesh.p[0]):
+        raise InputError(f"body '{part.name}': an axisymmetric mesh lies in r >= 0; its least r is {mesh.p[0].min():g}.")
+    known = mesh.boundaries or {}
+    names = [part.contact, *(s.boundary for s in part.supports)]
+    names += [load.boundary for load in part.loads if isinstance(load, (Traction, Plate))]
+    for name in names:
+        if name not in known or len(known[name]) == 0:
+            raise InputError(
+                f"body '{part.name}': the mesh has no boundary named {name!r} (or it is empty); "
+                f"it has {', '.join(sorted(known)) or 'none'}."
+            )
+
+
+def _load(part: Part, basis: skfem.CellBasis, weight: tuple[float, bool]) -> np.ndarray:
+    total = np.zeros(basis.N)
+    for load in part.loads:
+        if isinstance(load, Plate):
+            continue
+        value = np.asarray(load.value, dtype=float)
+
+        @skfem.LinearForm
+        def form(v, w, value=value):  # type: ignore[no-untyped-def]
+            return dot(value.reshape((-1, 1, 1)) * np.ones_like(v), v) * weight_at(weight, w.x)
+
+        where = basis.boundary(load.boundary) if isinstance(load, Traction) else basis
+        total += form.assemble(where)
+    return total
+
+
+def _constraints(scene: Scene, part: Part, basis: skfem.CellBasis) -> tuple[np.ndarray, ...]:
+    """Prescribed displacements, the mask of unknowns that are not free, plate motions and plate forces."""
+    lift, held = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
+
+    def unknowns(boundary: str, component: str) -> np.ndarray:
+        nodes = np.unique(basis.mesh.facets[:, basis.mesh.boundaries[boundary]])
+        return np.asarray(basis.nodal_dofs[scene.components.index(component), nodes])
+
+    for support in part.supports:
+        values = dict.fromkeys(scene.components, 0.0) if support.displacement is None else support.displacement
+        for component, value in values.items():
+            where = unknowns(support.boundary, component)
+            if np.any(held[where] & (lift[where] != value)):
+                raise InputError(
+                    f"body '{part.name}': the support on {support.boundary!r} prescribes {component} = {value:g} at a "
+                    "node where another support prescribes a different value."
+                )
+            lift[where], held[where] = value, True
+    columns, thrust = [], []
+    supported = held.copy()
+    for plate in (load for load in part.loads if isinstance(load, Plate)):
+        for component in scene.components:
+            where = unknowns(plate.boundary, component)
+            if component in plate.force:
+                if np.any(supported[where]):
+                    raise InputError(
+                        f"body '{part.name}': the plate on {plate.boundary!r} moves in {component}, but a support or "
+                        "another plate holds one of its nodes in that component."
+                    )
+                column = np.zeros(basis.N)
+                column[where] = 1.0
+                columns.append(column)
+                thrust.append(plate.force[component])
+            elif not plate.glued:
+                continue
+            elif np.any(lift[where] != 0):
+                raise InputError(
+                    f"body '{part.name}': a support moves the plate on {plate.boundary!r}, which holds {component}; "
+                    "drop the plate or the support."
+                )
+            held[where] = True
+        supported = held.copy()
+    motion = np.stack(columns, axis=1) if columns else np.zeros((basis.N, 0))
+    return lift, held, motion, np.array(thrust, dtype=float)
+
+
+def _check_rigid_modes(scene: Scene, part: Part, basis: skfem.CellBasis, held: np.ndarray) -> None:
+    """The motions of the body as a rigid whole must not all leave the held unknowns at rest."""
+    x = basis.mesh.p - basis.mesh.p.mean(axis=1, keepdims=True)
+    x = x / np.abs(x).max()
+    names, modes = [], []
+    for i, component in enumerate(scene.components):
+        if not (scene.kind == "axisymmetric" and component == "r"):
+            modes.append(np.zeros_like(x))
+            modes[-1][i] = 1.0
+            names.append(f"translation along {component}")
+    if scene.kind != "axisymmetric":
+        for i in range(scene.dim):
+            for j in range(i):
+                modes.append(np.zeros_like(x))
+                modes[-1][i], modes[-1][j] = x[j], -x[i]
+                names.append(f"rotation in the {scene.components[j]}-{scene.components[i]} plane")
+    R = np.zeros((basis.N, len(modes)))
+    for column, mode in zip(R.T, modes):
+        column[basis.nodal_dofs] = mode
+    values, vectors = np.linalg.eigh(R[held].T @ R[held])  # its kernel: the motions that nothing holds
+    if values[0] < 1e-12 * held.sum() or not held.any():
+        motion = names[int(np.argmax(np.abs(vectors[:, 0])))]
+        raise InputError(
+            f"body '{part.name}' is free to move ({motion}), so its stiffness is singular; "
+            "add a Support, or load it through a rigid Plate."
+        )
+
+
+def _contact(part: Part, mesh: skfem.Mesh, scalar: skfem.Element, weight: tuple[float, bool]) -> tuple[np.ndarray, ...]:
+    facets = skfem.FacetBasis(mesh, scalar, facets=mesh.boundaries[part.contact], intorder=3)
+
+    def integrate(value) -> np.ndarray:  # type: ignore[no-untyped-def]
+        return skfem.LinearForm(lambda v, w: value(w) * v).assemble(facets)
+
+    nodes = np.unique(mesh.facets[:, mesh.boundaries[part.contact]])
+    areas = integrate(lambda w: weight_at(weight, w.x))[nodes]
+    normals = np.stack([integrate(lambda w, i=i: w.n[i])[nodes] for i in range(mesh.p.shape[0])])
+    return nodes, areas, normals / np.linalg.norm(normals, axis=0)

@@ -1,0 +1,65 @@
+"""Projections of contact mechanics: half-line, interval or disc, Coulomb's cone; vectorised over the contacts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def split(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normal part (k,) and tangential part (k, dim - 1) of blocks (k, dim)."""
+    return blocks[:, 0], blocks[:, 1:]
+
+
+def disc(t: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Nearest points of discs |t| <= radius: t (k, d), radius (k,) >= 0; an interval for d = 1."""
+    length = np.linalg.norm(t, axis=1)
+    shrink = np.divide(radius, length, out=np.ones_like(length), where=length > radius)
+    return np.asarray(t * shrink[:, None])
+
+
+def coulomb_cone(r: np.ndarray, mu: np.ndarray) -> np.ndarray:
+    """Nearest points of the cones |r_t| <= mu r_n: r (k, dim), mu (k,) >= 0."""
+    n, t = split(r)
+    length = np.linalg.norm(t, axis=1)
+    inside = length <= mu * n
+    polar = mu * length <= -n  # nearest point is the apex
+    height = np.where(inside, n, np.where(polar, 0.0, (n + mu * length) / (1 + mu**2)))
+    out = np.empty_like(r)
+    out[:, 0] = height
+    out[:, 1:] = disc(t, mu * np.maximum(height, 0.0))
+    return out
+
+
+def friction_cone(r: np.ndarray, u: np.ndarray, rho: float, mu: np.ndarray, bilateral: bool) -> np.ndarray:
+    """proj_K(r - rho (u + mu |u_t| n)), the natural map of Coulomb friction (De Saxce's form).
+
+    Bilateral contact: the normal part is r_n - rho u_n, the tangential part is projected on the disc mu |r_n|.
+    """
+    if bilateral:
+        return np.concatenate([r[:, :1] - rho * u[:, :1], disc(r[:, 1:] - rho * u[:, 1:], mu * np.abs(r[:, 0]))], axis=1)
+    shifted = r - rho * u
+    shifted[:, 0] -= rho * mu * np.linalg.norm(u[:, 1:], axis=1)
+    return coulomb_cone(shifted, mu)
+
+
+def half_line_derivative(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Projection of y (k, 1) on [0, inf) and its generalised derivative (k, 1, 1)."""
+    return np.maximum(y, 0.0), (y > 0).astype(float)[:, :, None]
+
+
+def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Projection of y (k, d) on discs |y| <= radius and its generalised derivative (k, d, d).
+
+    Outside the disc the derivative is (radius / |y|) (I - y y' / |y|^2), zero for d = 1.
+    """
+    k, d = y.shape
+    length = np.linalg.norm(y, axis=1)
+    outside = length > radius
+    unit = np.divide(y, length[:, None], out=np.zeros_like(y), where=length[:, None] > 0)
+    D = np.broadcast_to(np.eye(d), (k, d, d)).copy()
+    if d == 1:
+        D[outside] = 0.0
+    else:
+        shrink = np.divide(radius, length, out=np.ones_like(length), where=outside)
+        D[outside] = shrink[outside, None, None] * (D - unit[:, :, None] * unit[:, None, :])[outside]
+    return disc(y, radius), D

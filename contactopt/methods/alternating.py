@@ -1,0 +1,123 @@
+"""The paper's two-stage iteration (section 5.1): normal and tangential forces in turn.
+
+Normal problem, r_t fixed (eq (21); its optimality conditions are Signorini's, eq (15)): a bound-constrained QP,
+    min  r_n' Q_nn r_n / 2 + (q_n + Q_nt r_t)' r_n    subject to  r_n >= 0,  V_n' r_n = -s - V_t' r_t.
+Tangential problem, r_n fixed (eq (22)): a box-constrained QP with one tangential direction, an SOCP with two,
+    min  r_t' Q_tt r_t / 2 + (q_t + Q_tn r_n + V_t lambda)' r_t    subject to  |r_t| <= mu |r_n|.
+The multipliers of the balance rows are the plates' displacements. Plates that move tangentially only belong to the
+tangential problem. Each iteration costs one QP and one QP or SOCP. It contracts where friction couples weakly to the
+normal force (small mu, similar bodies) and may cycle otherwise; relaxation < 1 then often helps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactopt.backends import CONIC, QP, find
+from contactopt.backends.conic import DiscSOCP
+from contactopt.backends.qp import BoxQP
+from contactopt.cones import disc_derivative, half_line_derivative
+from contactopt.crossover import crossover
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem
+from contactopt.scene import check_number
+
+
+@dataclass(frozen=True)
+class Alternating:
+    """normal, tangential: names of the backends; tangential None is proxqp for intervals, clarabel for discs.
+
+    relaxation in (0, 1]: the fraction of each new tangential force that is taken.
+    """
+
+    normal: str = "proxqp"
+    tangential: str | None = None
+    relaxation: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_number("the relaxation", self.relaxation, low=0.0, high=1.0 + 1e-12)
+        find(self.normal, QP)
+        if self.tangential is not None:
+            find(self.tangential, QP if self.tangential not in CONIC else CONIC)
+
+    def backends(self, dim: int) -> tuple[str, str]:
+        """Names of the normal and the tangential backend for that dimension."""
+        return self.normal, self.tangential or ("proxqp" if dim == 2 else "clarabel")
+
+    def iterate(self, problem: InterfaceProblem) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        k, p = problem.contacts, len(problem.s)
+        pushes = np.any(np.abs(_rows(problem.V, problem.dim, normal=True)) > 1e-9, axis=0)
+        normal = NormalProblem(self.normal, problem, pushes)
+        tangential = TangentialProblem(self.backends(problem.dim)[1], problem, ~pushes)
+        r_n, r_t, multipliers = np.zeros(k), np.zeros((k, problem.dim - 1)), np.zeros(p)
+        while True:
+            r_n, multipliers[pushes] = normal.solve(r_t, r_n, multipliers)
+            new, multipliers[~pushes] = tangential.solve(r_n, r_t, multipliers)
+            r_t = new + (1 - self.relaxation) * (r_t - new)
+            yield np.concatenate([r_n[:, None], r_t], axis=1), multipliers.copy()
+
+
+def _index(k: int, dim: int, normal: bool) -> np.ndarray:
+    blocks = np.arange(k * dim).reshape(k, dim)
+    return blocks[:, 0] if normal else blocks[:, 1:].ravel()
+
+
+def _rows(V: np.ndarray, dim: int, normal: bool) -> np.ndarray:
+    return V[_index(len(V) // dim, dim, normal)]
+
+
+class NormalProblem:
+    """The normal QP of one problem: Q_nn is handed to the backend once."""
+
+    def __init__(self, backend: str, problem: InterfaceProblem, columns: np.ndarray):
+        n, t = (_index(problem.contacts, problem.dim, normal) for normal in (True, False))
+        self.problem, self.columns = problem, columns
+        self.Q, self.Q_nt = problem.Q[np.ix_(n, n)], problem.Q[np.ix_(n, t)]
+        self.V, self.V_t, self.V_other = problem.V[n][:, columns], problem.V[t][:, columns], problem.V[n][:, ~columns]
+        self.qp = BoxQP.using(backend, self.Q, self.V.T)
+        self.low = np.full(problem.contacts, -np.inf if problem.bilateral else 0.0)
+
+    def solve(self, r_t: np.ndarray, r_n: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """r_n (k,) and the multipliers of this problem's balance rows."""
+        c = self.problem.q[:, 0] + self.Q_nt @ r_t.ravel() + self.V_other @ multipliers[~self.columns]
+        s = self.problem.s[self.columns] + self.V_t.T @ r_t.ravel()
+        r, lam = self.qp.solve(c, -s, self.low, np.full(len(c), np.inf), start=r_n)
+        project = _whole_line if self.problem.bilateral else half_line_derivative
+        polished, lam = crossover(self.Q, c, self.V, s, project, r[:, None], lam)
+        return polished[:, 0], lam
+
+
+class TangentialProblem:
+    """The tangential QP (one direction) or SOCP (two) of one problem, built once."""
+
+    def __init__(self, backend: str, problem: InterfaceProblem, columns: np.ndarray):
+        n, t = (_index(problem.contacts, problem.dim, normal) for normal in (True, False))
+        self.problem, self.columns = problem, columns
+        self.Q, self.Q_tn = problem.Q[np.ix_(t, t)], problem.Q[np.ix_(t, n)]
+        self.V, self.V_n, self.V_other = problem.V[t][:, columns], problem.V[n][:, columns], problem.V[t][:, ~columns]
+        self.active = bool(np.any(problem.mu > 0))
+        if not self.active and columns.any():
+            raise InputError("a plate that moves tangentially needs friction to hold it, but mu = 0.")
+        if self.active:
+            bridge = BoxQP if problem.dim == 2 else DiscSOCP
+            self.solver = bridge.using(backend, self.Q, self.V.T)
+
+    def solve(self, r_n: np.ndarray, r_t: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """r_t (k, dim - 1) and the multipliers of this problem's balance rows."""
+        if not self.active:
+            return np.zeros_like(r_t), np.zeros(0)
+        c = self.problem.q[:, 1:].ravel() + self.Q_tn @ r_n + self.V_other @ multipliers[~self.columns]
+        s = self.problem.s[self.columns] + self.V_n.T @ r_n
+        radius = self.problem.mu * np.abs(r_n)
+        if isinstance(self.solver, BoxQP):
+            r, lam = self.solver.solve(c, -s, -radius, radius, start=r_t.ravel())
+        else:
+            r, lam = self.solver.solve(c, -s, radius)
+        return crossover(self.Q, c, self.V, s, lambda y: disc_derivative(y, radius), r.reshape(r_t.shape), lam)
+
+
+def _whole_line(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return y, np.ones((len(y), 1, 1))
