@@ -25,15 +25,22 @@ from contactopt.errors import InputError
 
 
 class Status(Enum):
-    """How a solve ended. The value is the sentence a person reads."""
+    """How a solve ended: a word for tables and a sentence for people."""
 
-    SOLVED = "solved: the natural-map residual is at most the tolerance"
-    SETTLED = "settled: the change per iteration met its own criterion, but the certificate is above the tolerance"
-    ITERATION_LIMIT = "iteration limit: the certificate is above the tolerance"
-    TIME_LIMIT = "time limit: the certificate is above the tolerance"
-    CYCLING = "cycling: the iteration came back to an earlier state, so it cannot converge; try relaxation"
-    STALLED = "stalled: the iterate no longer changes, but the certificate is above the tolerance"
-    BACKEND_FAILED = "backend failed: a QP or conic backend gave no usable answer"
+    SOLVED = "solved", "the natural-map residual is at most the tolerance"
+    SETTLED = "settled", "the change per iteration met its own criterion, but the certificate is above the tolerance"
+    ITERATION_LIMIT = "iteration_limit", "the iterations ran out with the certificate above the tolerance"
+    TIME_LIMIT = "time_limit", "the time ran out with the certificate above the tolerance"
+    CYCLING = "cycling", "the iteration came back to an earlier state, so it cannot converge; try relaxation"
+    STALLED = "stalled", "the iterate no longer changes, but the certificate is above the tolerance"
+    BACKEND_FAILED = "backend_failed", "a QP or conic backend gave no usable answer"
+
+    def __init__(self, label: str, sentence: str):
+        self.label = label
+        self.sentence = sentence
+
+    def __str__(self) -> str:
+        return self.label
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from contactopt.errors import InputError
 from contactopt.scene import Material, Part, Plate, Rigid, Scene, Support, check_number
 
 RUBBER = Material(E=5.0, nu=0.3)  # MPa, the material of all the paper's bodies
-GROWTH = 1.2  # ratio of neighbouring elements away from the contact
+GROWTH = {2: 1.2, 3: 1.3}  # ratio of neighbouring elements away from the contact, by dimension
 MARGIN = 1.25  # candidate contact zone of the sphere, over the half-width its mesh resolves
 
 
@@ -52,21 +52,21 @@ def flat_punch(
     check_number("force", force, low=0.0)
     if foundation_width < width:
         raise InputError(f"the foundation ({foundation_width:g} wide) must be at least as wide as the punch ({width:g}).")
-    a, up = width / 2, "xyz"[dim - 1]
+    a, up, growth = width / 2, "xyz"[dim - 1], GROWTH[dim]
 
     def punch_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
         from contactopt.mesh import contact_grid, graded, rename, tensor_mesh
 
-        rise = graded(height, a / elements, GROWTH)
-        across = contact_grid(a, elements, a, GROWTH)
+        rise = graded(height, a / elements, growth)
+        across = contact_grid(a, elements, a, growth)
         mesh = tensor_mesh(*[across] * (dim - 1), rise)
         return rename(mesh, contact=f"{up}-", top=f"{up}+", **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
 
     def foundation_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
         from contactopt.mesh import contact_grid, graded, patch, rename, tensor_mesh
 
-        depth_grid = -graded(foundation_height, a / elements, GROWTH)[::-1]
-        across = contact_grid(a, elements, foundation_width / 2, GROWTH)
+        depth_grid = -graded(foundation_height, a / elements, growth)[::-1]
+        across = contact_grid(a, elements, foundation_width / 2, growth)
         mesh = tensor_mesh(*[across] * (dim - 1), depth_grid)
         mesh = rename(mesh, top=f"{up}+", bottom=f"{up}-", **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
         return patch(mesh, "top", "contact", [a] * (dim - 1))
@@ -102,14 +102,14 @@ def sphere(
     lower: Material = RUBBER,
     mu: float = 0.5,
     force: float = 100.0,
-    elements: int = 24,
+    elements: int = 32,
     rigid: str | None = None,
     bilateral: bool = False,
 ) -> Scene:
     """A half sphere pressed on a foundation by a rigid plate glued to its flat face; axisymmetric.
 
     rigid  None, 'sphere' or 'foundation': that body is rigid
-    Sizes in mm, force in N; elements across the contact half-width, whose first guess is Hertz's.
+    Sizes in mm, force in N; elements across the contact half-width. The zone loop starts from a zone wider than Hertz's.
     """
     if rigid not in (None, "sphere", "foundation"):
         raise InputError(f"rigid must be None, 'sphere' or 'foundation'; got {rigid!r}.")
@@ -125,33 +125,31 @@ def sphere(
             f"foundation of radius {foundation_radius:g}; lower the force or take stiffer or larger bodies."
         )
 
-    def zone_grid(elements: int, zone: float | None, length: float) -> np.ndarray:
-        from contactopt.mesh import contact_grid
+    def candidates(elements: int, zone: float | None) -> np.ndarray:
+        """Radii of the candidate contact nodes: even spacing, one node at the zone's edge, a margin beyond it."""
+        spacing = min(zone or hertz.half_width, widest) / elements
+        return spacing * np.arange(elements + int(np.ceil((MARGIN - 1) * elements)) + 1)
 
-        zone = min(zone or hertz.half_width, widest)
-        extra = int(np.ceil((MARGIN - 1) * elements))
-        return contact_grid(zone * (1 + extra / elements), elements + extra, length, GROWTH)
+    def beyond(grid: np.ndarray, length: float) -> np.ndarray:
+        from contactopt.mesh import graded
 
-    def candidates(elements: int, zone: float | None) -> float:
-        zone = min(zone or hertz.half_width, widest)
-        return zone * (1 + int(np.ceil((MARGIN - 1) * elements)) / elements)
+        return np.concatenate([grid, grid[-1] + graded(length - grid[-1], grid[1] * GROWTH[2], GROWTH[2])[1:]])
 
     def sphere_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
         from contactopt.mesh import graded, half_sphere_section, patch
 
-        grid = zone_grid(elements, zone, radius / sqrt(2))
-        mesh = half_sphere_section(radius, grid, graded(radius, grid[1], GROWTH) / radius)
-        return patch(mesh, "arc", "contact", [candidates(elements, zone)])
+        contact = candidates(elements, zone)
+        grid = beyond(contact, radius / sqrt(2))
+        mesh = half_sphere_section(radius, grid, graded(radius, grid[1], GROWTH[2]) / radius)
+        return patch(mesh, "arc", "contact", [contact[-1]])
 
     def foundation_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
         from contactopt.mesh import graded, patch, rename, tensor_mesh
 
-        grid = zone_grid(elements, zone, radius / sqrt(2))
-        grid = np.append(grid[grid < candidates(elements, zone) * (1 + 1e-9)], [])
-        last = grid[-1] - grid[-2]
-        grid = np.concatenate([grid, grid[-1] + graded(foundation_radius - grid[-1], last * GROWTH, GROWTH)[1:]])
-        mesh = tensor_mesh(grid, -graded(foundation_height, grid[1], GROWTH)[::-1])
-        return patch(rename(mesh, axis="x-", bottom="y-", top="y+"), "top", "contact", [candidates(elements, zone)])
+        contact = candidates(elements, zone)
+        depth = graded(foundation_height, contact[1], GROWTH[2])
+        mesh = tensor_mesh(beyond(contact, foundation_radius), -depth[::-1])
+        return patch(rename(mesh, axis="x-", bottom="y-", top="y+"), "top", "contact", [contact[-1]])
 
     axis = Support("axis", {"r": 0.0})
     load = {"z": -force}
@@ -173,7 +171,7 @@ def sphere(
         kind="axisymmetric",
         bilateral=bilateral,
         elements=elements,
-        zone=hertz.half_width,
+        zone=MARGIN * hertz.half_width,
         reference=hertz,
     )
 

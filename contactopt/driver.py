@@ -76,7 +76,7 @@ def solve(
         repr(method),
         tuple(recorder.history),
         {"solve": recorder.clock},
-        message or status.value,
+        message or status.sentence,
     )
 
 

@@ -1,0 +1,88 @@
+"""The contact zone: its size read from the reactions, and the outer loop that remeshes to it (paper, sections 3, 4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from contactopt.driver import solve
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem, Solution
+from contactopt.reduction import Reduction, reduce_bodies
+from contactopt.scene import Scene
+
+FIT = 4  # nodes next to the edge through which p^2 is extrapolated
+AGREE = 0.05  # two zones agree when they differ by less than this fraction of an element
+LOOPS = 10
+
+
+def pressed(reactions: np.ndarray) -> np.ndarray:
+    """Mask (k,) of the nodes in contact: normal reaction beyond rounding."""
+    return np.asarray(np.abs(reactions[:, 0]) > 1e-10 * np.abs(reactions[:, 0]).max(initial=0.0))
+
+
+def stuck(reactions: np.ndarray, mu: np.ndarray) -> np.ndarray:
+    """Mask (k,) of the nodes in contact whose tangential reaction is below the friction bound."""
+    bound = mu * np.abs(reactions[:, 0])
+    return pressed(reactions) & (np.linalg.norm(reactions[:, 1:], axis=1) < (1 - 1e-6) * bound)
+
+
+def equivalent_half_width(scene: Scene, area: float) -> float:
+    """Half-width of the strip, radius of the disc or half side of the square of that area [length]."""
+    if scene.kind == "plane-strain":
+        return area / (2 * scene.thickness)
+    return float(np.sqrt(area / np.pi) if scene.kind == "axisymmetric" else np.sqrt(area) / 2)
+
+
+def contact_half_width(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
+    """Half-width of the contact zone [length], below the element size where the zone has a smooth edge.
+
+    p^2 is smooth in x^2 next to an edge where contact ends by itself: a line through its last inner nodes gives the
+    edge. That needs a scene with a zone about x = 0; otherwise the half-width of the area of the nodes in contact.
+    """
+    active = pressed(reactions)
+    if scene.zone is not None and not active.all() and active.sum() > FIT + 1:
+        assert problem.coordinates is not None
+        x = np.abs(problem.coordinates[0])
+        inner = np.argsort(np.where(active, x, -1.0))[-1 - FIT : -1]
+        slope, value = np.polyfit(x[inner] ** 2, (reactions[inner, 0] / problem.areas[inner]) ** 2, 1)
+        if slope < 0:
+            return float(np.sqrt(-value / slope))
+    return equivalent_half_width(scene, float(problem.areas[active].sum()))
+
+
+def stick_half_width(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
+    """Half-width of the area of the sticking nodes [length]; 0 without any."""
+    return equivalent_half_width(scene, float(problem.areas[stuck(reactions, problem.mu)].sum()))
+
+
+def solve_zone(
+    scene: Scene,
+    elements: int | None = None,
+    note: Callable[[str], None] = lambda text: None,
+    **settings: Any,
+) -> tuple[Reduction, Solution, list[float]]:
+    """Reduce and solve; where the scene has a contact zone, remesh until its edge is a node of both meshes.
+
+    Each round solves on meshes with a node at the present zone's edge and reads the new edge from the reactions; two
+    zones agree when they differ by a twentieth of an element. Returns the last reduction and solution with the zones
+    tried, the last of them the result; one zone, the scene's, if there is no loop. settings go to solve().
+    """
+    elements = scene.elements if elements is None else elements
+    zones = [scene.zone] if scene.zone is not None else []
+    while True:
+        note(f"reducing {scene.name}" + (f", zone {zones[-1]:.6g}" if zones else ""))
+        reduction = reduce_bodies(scene, elements, zones[-1] if zones else None)
+        note(f"solving {reduction.problem.contacts} contacts")
+        solution = solve(reduction.problem, **settings)
+        if not zones:
+            return reduction, solution, []
+        width = contact_half_width(scene, reduction.problem, solution.reactions)
+        if pressed(solution.reactions).sum() < 2:
+            raise InputError(f"scene '{scene.name}': no contact zone to resolve; bring the bodies into contact.")
+        agreed = abs(width - zones[-1]) <= AGREE * zones[-1] / elements
+        zones.append(width)
+        if agreed or not solution.solved or len(zones) > LOOPS:
+            return reduction, solution, zones
