@@ -1,0 +1,201 @@
+"""The whole way in one call: scene -> reduction -> solution -> fields -> figures and files."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.errors import InputError
+from contactopt.methods import find_method
+from contactopt.problem import InterfaceProblem, Solution
+from contactopt.recover import Fields, recover
+from contactopt.reduction import Reduction
+from contactopt.scene import Scene
+from contactopt.scenes import make_scene
+from contactopt.zone import contact_half_width, solve_zone, stick_half_width
+
+Note = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A solved scene. `summary` is what summary.json holds; `zones` the half-widths of the contact-zone loop."""
+
+    scene: Scene
+    reduction: Reduction
+    solution: Solution
+    fields: tuple[Fields, ...]
+    zones: tuple[float, ...]
+    summary: dict[str, Any]
+
+    @property
+    def problem(self) -> InterfaceProblem:
+        return self.reduction.problem
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """Contact pressure at the contact nodes, (k,) [stress]."""
+        return np.asarray(self.solution.reactions[:, 0] / self.problem.areas)
+
+    @property
+    def traction(self) -> np.ndarray:
+        """Tangential traction on the upper body, (k,) or in 3D (k, 2) [stress]."""
+        return _squeeze(self.solution.reactions[:, 1:] / self.problem.areas[:, None])
+
+
+def run(
+    scene: str | Scene,
+    out: str | Path | None = None,
+    *,
+    method: str = "alternating",
+    normal: str | None = None,
+    tangential: str | None = None,
+    tol: float = 1e-8,
+    elements: int | None = None,
+    note: Note = lambda text: None,
+    **changes: Any,
+) -> Result:
+    """Solve a scene end to end, and write its figures and files into the directory `out` if one is given.
+
+    scene     a name (see contactopt.scenes.SCENES) with `changes` to its arguments, or a Scene with `changes` to its fields
+    method, normal, tangential   names; None is the method's default backend
+    elements  across the contact half-width;  tol  bound on the natural-map residual;  note  receives progress messages
+    Raises InputError and BackendError with a sentence that says what to do; nothing is left half-written.
+    """
+    start = time.perf_counter()
+    if elements is not None:
+        changes["elements"] = elements
+    scene = make_scene(scene, **changes) if isinstance(scene, str) else _changed(scene, changes)
+    given = {"normal": normal, "tangential": tangential}
+    chosen = find_method(method, **{k: v for k, v in given.items() if v is not None})
+    target = None if out is None else _writable(Path(out))
+    reduction, solution, zones = solve_zone(scene, note=note, method=chosen, tol=tol)
+    seconds = dict(reduction.seconds) | solution.seconds
+    with _Timer(seconds, "recover"):
+        fields = recover(reduction, solution)
+    summary = _summary(scene, reduction, solution, method, chosen, zones)
+    result = Result(scene, reduction, solution, fields, tuple(zones), summary)
+    summary["seconds"] = seconds
+    if target is not None:
+        note("drawing figures, writing files")
+        _write(result, target, seconds, start)
+    seconds["total"] = time.perf_counter() - start
+    return result
+
+
+def _changed(scene: Scene, changes: dict[str, Any]) -> Scene:
+    try:
+        return replace(scene, **changes)
+    except TypeError as error:
+        raise InputError(f"scene '{scene.name}': {error}.") from error
+
+
+def _summary(
+    scene: Scene, reduction: Reduction, solution: Solution, method: str, chosen: Any, zones: list[float]
+) -> dict[str, Any]:
+    problem, r = reduction.problem, solution.reactions
+    normal, tangential = chosen.backends(problem.dim)
+    width = zones[-1] if zones else contact_half_width(scene, problem, r)
+    return {
+        "scene": scene.name,
+        "dofs": reduction.dofs,
+        "contact_nodes": problem.contacts,
+        "mu": float(scene.mu),
+        "method": method,
+        "normal_backend": normal,
+        "tangential_backend": tangential,
+        "status": solution.status.label,
+        "residual": float(solution.residual),
+        "outer_iterations": solution.iterations,
+        "normal_force": float(r[:, 0].sum()),
+        "approach": _approach(problem, solution),
+        "contact_half_width": float(width),
+        "stick_half_width": min(float(width), stick_half_width(scene, problem, r)),
+        "max_pressure": float((r[:, 0] / problem.areas).max()),
+    }
+
+
+def _approach(problem: InterfaceProblem, solution: Solution) -> float | None:
+    """By how much the plates bring the bodies together along the mean normal [length]; None without a plate."""
+    if len(solution.multipliers) == 0:
+        return None
+    normal = (problem.V @ solution.multipliers).reshape(problem.q.shape)[:, 0]
+    return -float(np.average(normal, weights=problem.areas))
+
+
+def _squeeze(t: np.ndarray) -> np.ndarray:
+    return t[:, 0] if t.shape[1] == 1 else t
+
+
+class _Timer:
+    def __init__(self, seconds: dict[str, float], phase: str):
+        self.seconds, self.phase = seconds, phase
+
+    def __enter__(self) -> None:
+        self.start = time.perf_counter()
+
+    def __exit__(self, *error: object) -> None:
+        self.seconds[self.phase] = time.perf_counter() - self.start
+
+
+def _writable(out: Path) -> Path:
+    """Check, before any work, that files can be put there; InputError if not. Leaves nothing behind."""
+    existing = out
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    try:
+        if not existing.is_dir():
+            raise NotADirectoryError(f"{existing} is not a directory")
+        with tempfile.TemporaryFile(dir=existing):
+            pass
+    except OSError as error:
+        raise InputError(f"cannot write into '{out}': {error.strerror or error}; choose another output directory.") from error
+    return out
+
+
+def _write(result: Result, out: Path, seconds: dict[str, float], start: float) -> None:
+    """All files into a temporary neighbour first, then into place."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        staging = Path(tempfile.mkdtemp(prefix=".contactopt-", dir=out))
+    except OSError as error:
+        raise InputError(f"cannot write into '{out}': {error.strerror or error}; choose another output directory.") from error
+    try:
+        with _Timer(seconds, "figures"):
+            _draw(result, staging)
+        with _Timer(seconds, "files"):
+            for fields in result.fields:
+                fields.write_vtu(staging / f"{fields.name}.vtu")
+            _write_interface(result, staging / "interface.npz")
+        seconds["total"] = time.perf_counter() - start
+        (staging / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")
+        for file in staging.iterdir():
+            os.replace(file, out / file.name)
+    except OSError as error:
+        raise InputError(f"cannot write into '{out}': {error.strerror or error}.") from error
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def _draw(result: Result, folder: Path) -> None:
+    from contactopt import plots
+
+    picture = plots.deformed(result.scene, result.problem, result.fields)
+    picture.figure.savefig(folder / "deformed.png", dpi=130)
+    plots.contact_figure(result.scene, result.problem, result.solution).savefig(folder / "pressure.png", dpi=130)
+
+
+def _write_interface(result: Result, path: Path) -> None:
+    problem, r = result.problem, result.solution.reactions
+    assert problem.coordinates is not None
+    x = problem.coordinates[:2].T if problem.dim == 3 else problem.coordinates[0]
+    np.savez(path, x=x, r_n=r[:, 0], r_t=_squeeze(r[:, 1:]), pressure=result.pressure, traction=result.traction)
