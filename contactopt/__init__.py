@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from contactopt.driver import solve
     from contactopt.errors import BackendError, InputError
     from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
-    from contactopt.recover import Fields, recover
+    from contactopt.recover import Fields
     from contactopt.reduction import reduce, reduce_bodies
     from contactopt.runner import Result, run
     from contactopt.scene import BodyForce, Material, Part, Plate, Rigid, Scene, Support, Traction

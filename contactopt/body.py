@@ -159,7 +159,9 @@ def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
     if not np.all(np.isfinite(mesh.p)):
         raise InputError(f"body '{part.name}': the mesh has a node whose coordinates are not finite numbers.")
     if scene.kind == "axisymmetric" and mesh.p[0].min() < -1e-12 * np.ptp(mesh.p[0]):
-        raise InputError(f"body '{part.name}': an axisymmetric mesh lies in r >= 0; its least r is {mesh.p[0].min():g}.")
+        raise InputError(
+            f"body '{part.name}': an axisymmetric mesh lies in r >= 0; its least r is {mesh.p[0].min():g}."
+        )
     known = mesh.boundaries or {}
     names = [part.contact, *(s.boundary for s in part.supports)]
     names += [load.boundary for load in part.loads if isinstance(load, (Traction, Plate))]

@@ -64,7 +64,9 @@ def _run(options: argparse.Namespace) -> int:
     approach = "none (no plate)" if s["approach"] is None else f"{s['approach']:.6g} mm"
     print(f"normal force {s['normal_force']:.6g} N, approach {approach}, largest pressure {s['max_pressure']:.6g} MPa")
     print(f"contact half-width {s['contact_half_width']:.6g} mm, stick half-width {s['stick_half_width']:.6g} mm")
-    print(f"{s['seconds']['total']:.1f} s: " + ", ".join(f"{k} {v:.2f}" for k, v in s["seconds"].items() if k != "total"))
+    print(
+        f"{s['seconds']['total']:.1f} s: " + ", ".join(f"{k} {v:.2f}" for k, v in s["seconds"].items() if k != "total")
+    )
     print(f"files in {out}: summary.json, deformed.png, pressure.png, interface.npz, *.vtu")
     return 0 if result.solution.solved else 1
 
@@ -76,9 +78,9 @@ def _list(options: argparse.Namespace) -> int:
     print("methods")
     for name, (_, _, what) in METHODS.items():
         print(f"  {name:12} {what}")
-    for title, table in (("QP backends (normal problem; tangential in 2D)", QP), ("conic backends (tangential in 3D)", CONIC)):
+    for title, table in (("QP backends (normal; tangential in 2D)", QP), ("conic backends (tangential in 3D)", CONIC)):
         print(title)
         for backend in table.values():
-            state = f"installed, {backend.version}" if backend.installed else f"not installed: pip install {backend.package}"
-            print(f"  {backend.name:12} {state}")
+            missing = f"not installed: pip install {backend.package}"
+            print(f"  {backend.name:12} {f'installed, {backend.version}' if backend.installed else missing}")
     return 0

@@ -36,7 +36,9 @@ def friction_cone(r: np.ndarray, u: np.ndarray, rho: float, mu: np.ndarray, bila
     Bilateral contact: the normal part is r_n - rho u_n, the tangential part is projected on the disc mu |r_n|.
     """
     if bilateral:
-        return np.concatenate([r[:, :1] - rho * u[:, :1], disc(r[:, 1:] - rho * u[:, 1:], mu * np.abs(r[:, 0]))], axis=1)
+        shifted = r - rho * u
+        shifted[:, 1:] = disc(shifted[:, 1:], mu * np.abs(r[:, 0]))
+        return shifted
     shifted = r - rho * u
     shifted[:, 0] -= rho * mu * np.linalg.norm(u[:, 1:], axis=1)
     return coulomb_cone(shifted, mu)

@@ -46,7 +46,9 @@ def solve(
     if isinstance(method, str):
         method = find_method(method, **settings)
     elif settings:
-        raise InputError(f"settings {', '.join(settings)} belong to a method given by name; set them on the method object.")
+        raise InputError(
+            f"settings {', '.join(settings)} belong to a method given by name; set them on the method object."
+        )
     _check_equilibrium(problem)
     scaled, scales = dimensionless(problem)
     recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)
@@ -126,6 +128,6 @@ def _check_equilibrium(problem: InterfaceProblem) -> None:
     V = problem.V.reshape(problem.contacts, problem.dim, -1)
     for column, s in zip(np.moveaxis(V, 2, 0), problem.s):
         size = np.abs(column).max(initial=0.0)
-        if size > 0 and np.all(np.abs(column[:, 1:]) <= 1e-9 * size) and s * np.sign(column[:, 0].sum()) > 0:
-            if np.all(column[:, 0] >= -1e-9 * size) or np.all(column[:, 0] <= 1e-9 * size):
-                raise InputError("the load on the plate pulls the bodies apart, so there is no equilibrium; press them together.")
+        push = column[:, 0] * np.sign(s)  # what normal reactions add to s
+        if size > 0 and np.all(np.abs(column[:, 1:]) <= 1e-9 * size) and s != 0 and np.all(push >= -1e-9 * size):
+            raise InputError("the load on the plate pulls the bodies apart: no equilibrium; press them together.")

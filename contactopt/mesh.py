@@ -39,14 +39,12 @@ def contact_grid(half_width: float, elements: int, length: float, growth: float)
 def tensor_mesh(*grids: np.ndarray) -> MeshQuad | MeshHex:
     """Bricks on a tensor grid. Boundaries 'x-', 'x+', 'y-', 'y+' (, 'z-', 'z+'): the faces of the box."""
     mesh = (MeshQuad if len(grids) == 2 else MeshHex).init_tensor(*grids)
-    return mesh.with_boundaries(
-        {
-            f"{name}{sign}": (lambda x, axis=axis, value=value: np.isclose(x[axis], value, rtol=0, atol=1e-9 * span))
-            for axis, (name, grid) in enumerate(zip("xyz", grids))
-            for span in [grid[-1] - grid[0]]
-            for sign, value in (("-", grid[0]), ("+", grid[-1]))
-        }
-    )
+    planes = {}
+    for axis, (name, grid) in enumerate(zip("xyz", grids)):
+        near = 1e-9 * (grid[-1] - grid[0])
+        for sign, value in (("-", grid[0]), ("+", grid[-1])):
+            planes[name + sign] = lambda x, axis=axis, value=value, near=near: np.abs(x[axis] - value) < near
+    return mesh.with_boundaries(planes)
 
 
 def rename(mesh: MeshQuad | MeshHex, **names: str) -> MeshQuad | MeshHex:

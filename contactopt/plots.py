@@ -64,7 +64,7 @@ def _draw_section(scene: Scene, fields: Sequence[Fields], scale: float, top: flo
     if scene.zone is not None:  # a small contact on large bodies: show where it happens
         reach = 4 * (scene.reference.half_width if scene.reference else scene.zone)
         ax.set(xlim=(-reach, reach), ylim=(-0.9 * reach, 0.6 * reach))
-    ax.figure.colorbar(colours, ax=ax, label=f"von Mises stress [{STRESS}]", extend="max")
+    ax.figure.colorbar(colours, ax=ax, label=f"von Mises stress [{STRESS}]", extend="max", shrink=0.8)
     return ax
 
 
@@ -75,7 +75,7 @@ def _half_model(scene: Scene, fields: Sequence[Fields]) -> bool:
 def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float, ax: Any) -> Any:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
     ax = _axes(ax, projection="3d")
     shade = ScalarMappable(Normalize(0, top), "viridis")
@@ -85,7 +85,9 @@ def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float
         facets = f.mesh.facets[:, f.mesh.boundary_facets()].T
         facets = _in_cycle(facets, points)
         colours = shade.to_rgba(f.von_mises[facets].mean(axis=1))
-        ax.add_collection3d(Poly3DCollection(points[facets], facecolors=colours, edgecolors=(0, 0, 0, 0.15), linewidths=0.2))
+        ax.add_collection3d(
+            Poly3DCollection(points[facets], facecolors=colours, edgecolors=(0, 0, 0, 0.15), linewidths=0.2)
+        )
         low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low)
@@ -114,7 +116,6 @@ def _in_cycle(facets: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 def _line(problem: InterfaceProblem) -> np.ndarray:
     """Contact nodes along the first axis, sorted; in 3D those of the row nearest y = 0."""
-    assert problem.coordinates is not None
     x = problem.coordinates
     row = np.ones(x.shape[1], dtype=bool)
     if problem.dim == 3:
@@ -175,7 +176,6 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
 def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
     """Contact patch of a 3D scene: sticking, slipping and open nodes, with the tangential traction as arrows."""
     ax = _axes(ax)
-    assert problem.coordinates is not None
     x, y = problem.coordinates[:2]
     touching, sticking = pressed(solution.reactions), stuck(solution.reactions, problem.mu)
     for mask, colour, marker, label in (
@@ -189,7 +189,7 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
     t = solution.reactions[:, 1:] / problem.areas[:, None]
     if np.any(t):
         ax.quiver(x, y, t[:, 0], t[:, 1], color="black", width=0.003)
-    ax.set(xlabel=f"x [{LENGTH}]", ylabel=f"y [{LENGTH}]", aspect="equal")
+    ax.set(xlabel=f"x [{LENGTH}]", ylabel=f"y [{LENGTH}]", aspect="equal", title="arrows: tangential traction")
     ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
     return ax
 

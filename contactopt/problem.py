@@ -52,7 +52,7 @@ class InterfaceProblem:
     mu           (k,) friction coefficients
     V, s         (k dim, p) rigid motions and (p,) resultants [force]; p = 0 without a plate
     areas        (k,) nodal areas, force / area = traction; ones by default
-    coordinates  (d, k) positions of the nodes, for output only
+    coordinates  (d, k) positions of the nodes, for output only; 0, 1, 2, ... by default
     bilateral    no separation: u_n = 0, friction bound mu |r_n|
     Raises InputError on wrong shapes, numbers that are not finite, negative mu or an unsymmetric Q.
     """
@@ -62,8 +62,8 @@ class InterfaceProblem:
     mu: np.ndarray
     V: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     s: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    areas: np.ndarray | None = None
-    coordinates: np.ndarray | None = None
+    areas: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    coordinates: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     bilateral: bool = False
 
     def __post_init__(self) -> None:
@@ -71,13 +71,15 @@ class InterfaceProblem:
         k, dim = q.shape
         if dim not in (2, 3):
             raise InputError(f"q must have 2 or 3 columns (normal first), one row per contact; got shape {q.shape}.")
+        places = np.atleast_2d(self.coordinates if np.size(self.coordinates) else np.arange(k))
         arrays: dict[str, tuple[Any, tuple[int, ...]]] = {
             "Q": (self.Q, (k * dim, k * dim)),
             "q": (q, (k, dim)),
             "mu": (np.broadcast_to(self.mu, (k,)) if np.ndim(self.mu) == 0 else self.mu, (k,)),
             "s": (self.s, (np.size(self.s),)),
             "V": (self.V if np.size(self.s) else np.zeros((k * dim, 0)), (k * dim, np.size(self.s))),
-            "areas": (np.ones(k) if self.areas is None else self.areas, (k,)),
+            "areas": (self.areas if np.size(self.areas) else np.ones(k), (k,)),
+            "coordinates": (places, (len(places), k)),
         }
         for name, (value, shape) in arrays.items():
             array = np.array(value, dtype=float)
@@ -165,7 +167,8 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     diagonal = np.diag(problem.Q)
     compliance = float(np.mean(diagonal[diagonal > 0])) if np.any(diagonal > 0) else 1.0
     columns = np.linalg.norm(problem.V, axis=0)
-    resultant = np.divide(np.abs(problem.s), np.abs(problem.V).sum(axis=0), out=np.zeros(len(problem.s)), where=columns > 0)
+    total = np.abs(problem.V).sum(axis=0)
+    resultant = np.divide(np.abs(problem.s), total, out=np.zeros(len(problem.s)), where=total > 0)
     force = float(resultant.max(initial=0.0)) or float(np.sqrt(np.mean(problem.q**2))) / compliance or 1.0
     length = force * compliance
     columns = np.where(columns > 0, columns, 1.0)

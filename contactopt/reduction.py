@@ -102,7 +102,8 @@ def reduce(scene: Scene, elements: int | None = None, zone: float | None = None)
     """The interface problem of a scene, Q explicit.
 
     elements  across the contact half-width (default: the scene's);  zone  half-width the meshes resolve [length].
-    Raises InputError on input that cannot be modelled: unknown boundaries, a body free to move, nodes that do not match.
+    Raises InputError on input that cannot be modelled: unknown boundaries, a body free to move,
+    nodes that do not match.
     """
     return reduce_bodies(scene, elements, zone).problem
 
@@ -172,7 +173,9 @@ def reduce_body(body: Body) -> ReducedBody:
     at_rest = at_rest + soft @ ((modes[:, ~free] / np.sqrt(stiffness[~free])).T @ thrust)
     basis = np.eye(len(thrust)) if free.all() else modes[:, free]  # keep one multiplier per plate component
     motions = Z @ basis
-    return ReducedBody(body, order, factors, order[len(order) - len(contact) :], compliance, at_rest, motions, basis.T @ thrust, soft)
+    return ReducedBody(
+        body, order, factors, order[len(order) - len(contact) :], compliance, at_rest, motions, basis.T @ thrust, soft
+    )
 
 
 def _elimination_order(body: Body, contact: np.ndarray) -> np.ndarray:
@@ -194,7 +197,8 @@ def _trailing_inverse(factors: SuperLU, m: int) -> np.ndarray:
     """The trailing m x m block of A^-1 from the factors of A: the inverse of the Schur complement S = L U."""
     n = factors.shape[0]
     head = n - m
-    if np.array_equal(np.sort(factors.perm_c[head:]), np.arange(head, n)) and np.array_equal(factors.perm_c, factors.perm_r):
+    symmetric = np.array_equal(factors.perm_c, factors.perm_r)
+    if symmetric and np.array_equal(np.sort(factors.perm_c[head:]), np.arange(head, n)):
         L, U = factors.L[head:, head:].toarray(), factors.U[head:, head:].toarray()
         place = factors.perm_c[head:] - head
         # S = L U = L D L' with D the pivots: C = (L^-1)' D^-1 L^-1 keeps C symmetric.
@@ -272,8 +276,8 @@ def _match(upper: Body, lower: Body) -> tuple[np.ndarray, np.ndarray]:
         )
     if distance.max() > MATCH * max(spacing, 1e-300) or len(np.unique(partner)) < len(partner):
         raise InputError(
-            f"interface nodes do not match: a contact node of body '{upper.name}' is {distance.max():.3g} away from the "
-            f"normal through the nearest one of body '{lower.name}' (spacing {spacing:.3g}); "
+            f"interface nodes do not match: a contact node of body '{upper.name}' lies {distance.max():.3g} off "
+            f"the normal through the nearest one of body '{lower.name}' (spacing {spacing:.3g}); "
             "give both meshes the same nodes there."
         )
     return order, partner

@@ -66,7 +66,7 @@ def run(
 ) -> Result:
     """Solve a scene end to end, and write its figures and files into the directory `out` if one is given.
 
-    scene     a name (see contactopt.scenes.SCENES) with `changes` to its arguments, or a Scene with `changes` to its fields
+    scene     a name (see contactopt.scenes.SCENES), `changes` to its arguments; or a Scene, `changes` to its fields
     method, normal, tangential   names; None is the method's default backend
     elements  across the contact half-width;  tol  bound on the natural-map residual;  note  receives progress messages
     Raises InputError and BackendError with a sentence that says what to do; nothing is left half-written.
@@ -79,7 +79,7 @@ def run(
     chosen = find_method(method, **{k: v for k, v in given.items() if v is not None})
     target = None if out is None else _writable(Path(out))
     reduction, solution, zones = solve_zone(scene, note=note, method=chosen, tol=tol)
-    seconds = dict(reduction.seconds) | solution.seconds
+    seconds = dict(solution.seconds)
     with _Timer(seconds, "recover"):
         fields = recover(reduction, solution)
     summary = _summary(scene, reduction, solution, method, chosen, zones)
@@ -158,8 +158,12 @@ def _writable(out: Path) -> Path:
         with tempfile.TemporaryFile(dir=existing):
             pass
     except OSError as error:
-        raise InputError(f"cannot write into '{out}': {error.strerror or error}; choose another output directory.") from error
+        raise _unwritable(out, error) from error
     return out
+
+
+def _unwritable(out: Path, error: OSError) -> InputError:
+    return InputError(f"cannot write into '{out}': {error.strerror or error}; choose another output directory.")
 
 
 def _write(result: Result, out: Path, seconds: dict[str, float], start: float) -> None:
@@ -168,7 +172,7 @@ def _write(result: Result, out: Path, seconds: dict[str, float], start: float) -
         out.mkdir(parents=True, exist_ok=True)
         staging = Path(tempfile.mkdtemp(prefix=".contactopt-", dir=out))
     except OSError as error:
-        raise InputError(f"cannot write into '{out}': {error.strerror or error}; choose another output directory.") from error
+        raise _unwritable(out, error) from error
     try:
         with _Timer(seconds, "figures"):
             _draw(result, staging)
@@ -181,7 +185,7 @@ def _write(result: Result, out: Path, seconds: dict[str, float], start: float) -
         for file in staging.iterdir():
             os.replace(file, out / file.name)
     except OSError as error:
-        raise InputError(f"cannot write into '{out}': {error.strerror or error}.") from error
+        raise _unwritable(out, error) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 
@@ -196,6 +200,5 @@ def _draw(result: Result, folder: Path) -> None:
 
 def _write_interface(result: Result, path: Path) -> None:
     problem, r = result.problem, result.solution.reactions
-    assert problem.coordinates is not None
     x = problem.coordinates[:2].T if problem.dim == 3 else problem.coordinates[0]
     np.savez(path, x=x, r_n=r[:, 0], r_t=_squeeze(r[:, 1:]), pressure=result.pressure, traction=result.traction)

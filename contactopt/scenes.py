@@ -46,12 +46,16 @@ def flat_punch(
         raise InputError(f"dim must be 2 or 3; got {dim!r}.")
     if rigid not in (None, "punch", "foundation"):
         raise InputError(f"rigid must be None, 'punch' or 'foundation'; got {rigid!r}.")
-    sizes = dict(width=width, height=height, foundation_width=foundation_width, foundation_height=foundation_height, depth=depth)
+    sizes = dict(
+        width=width, height=height, foundation_width=foundation_width, foundation_height=foundation_height, depth=depth
+    )
     for name, value in sizes.items():
         check_number(name, value, low=0.0)
     check_number("force", force, low=0.0)
     if foundation_width < width:
-        raise InputError(f"the foundation ({foundation_width:g} wide) must be at least as wide as the punch ({width:g}).")
+        raise InputError(
+            f"the foundation ({foundation_width:g} wide) must be at least as wide as the punch ({width:g})."
+        )
     a, up, growth = width / 2, "xyz"[dim - 1], GROWTH[dim]
 
     def punch_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
@@ -89,7 +93,7 @@ def flat_punch(
         copies=2 ** (dim - 1),
         bilateral=bilateral,
         elements=elements,
-        reference=flat_punch_line(force / depth, a) if dim == 2 else None,
+        reference=flat_punch_line(force / depth, a) if dim == 2 and rigid == "punch" else None,
     )
 
 
@@ -109,7 +113,7 @@ def sphere(
     """A half sphere pressed on a foundation by a rigid plate glued to its flat face; axisymmetric.
 
     rigid  None, 'sphere' or 'foundation': that body is rigid
-    Sizes in mm, force in N; elements across the contact half-width. The zone loop starts from a zone wider than Hertz's.
+    Sizes in mm, force in N; elements across the contact half-width. The zone loop starts wider than Hertz.
     """
     if rigid not in (None, "sphere", "foundation"):
         raise InputError(f"rigid must be None, 'sphere' or 'foundation'; got {rigid!r}.")
@@ -121,8 +125,8 @@ def sphere(
     widest = min(0.9 * radius / sqrt(2), foundation_radius) / MARGIN
     if hertz.half_width >= widest:
         raise InputError(
-            f"the contact radius would be about {hertz.half_width:.3g}, too much for a sphere of radius {radius:g} on a "
-            f"foundation of radius {foundation_radius:g}; lower the force or take stiffer or larger bodies."
+            f"the contact radius would be about {hertz.half_width:.3g}, too much for a sphere of radius {radius:g} on "
+            f"a foundation of radius {foundation_radius:g}; lower the force or take stiffer or larger bodies."
         )
 
     def candidates(elements: int, zone: float | None) -> np.ndarray:

@@ -1,8 +1,10 @@
-"""The contact zone: its size read from the reactions, and the outer loop that remeshes to it (paper, sections 3, 4.2)."""
+"""The contact zone: its size read from the reactions, and the loop that remeshes to it (paper, 3 and 4.2)."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,7 +46,6 @@ def contact_half_width(scene: Scene, problem: InterfaceProblem, reactions: np.nd
     """
     active = pressed(reactions)
     if scene.zone is not None and not active.all() and active.sum() > FIT + 1:
-        assert problem.coordinates is not None
         x = np.abs(problem.coordinates[0])
         inner = np.argsort(np.where(active, x, -1.0))[-1 - FIT : -1]
         slope, value = np.polyfit(x[inner] ** 2, (reactions[inner, 0] / problem.areas[inner]) ** 2, 1)
@@ -68,15 +69,20 @@ def solve_zone(
 
     Each round solves on meshes with a node at the present zone's edge and reads the new edge from the reactions; two
     zones agree when they differ by a twentieth of an element. Returns the last reduction and solution with the zones
-    tried, the last of them the result; one zone, the scene's, if there is no loop. settings go to solve().
+    tried, the last of them the result, none if there is no loop; `seconds` are summed over the rounds. settings go to
+    solve().
     """
     elements = scene.elements if elements is None else elements
+    seconds: Counter[str] = Counter()
     zones = [scene.zone] if scene.zone is not None else []
     while True:
         note(f"reducing {scene.name}" + (f", zone {zones[-1]:.6g}" if zones else ""))
         reduction = reduce_bodies(scene, elements, zones[-1] if zones else None)
         note(f"solving {reduction.problem.contacts} contacts")
         solution = solve(reduction.problem, **settings)
+        seconds.update(reduction.seconds)
+        seconds.update(solution.seconds)
+        solution = replace(solution, seconds=dict(seconds))
         if not zones:
             return reduction, solution, []
         width = contact_half_width(scene, reduction.problem, solution.reactions)

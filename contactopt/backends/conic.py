@@ -56,4 +56,6 @@ def _check_semidefinite(Q: np.ndarray) -> None:
     try:
         la.cholesky(Q + 1e-10 * np.trace(Q) / max(1, len(Q)) * np.eye(len(Q)), check_finite=False)
     except la.LinAlgError as error:
-        raise BackendError("the tangential compliance is not positive semidefinite, so its program is not convex.") from error
+        raise BackendError(
+            "the tangential compliance is not positive semidefinite, so its program is not convex."
+        ) from error

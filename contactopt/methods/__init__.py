@@ -23,7 +23,11 @@ class Method(Protocol):
 
 # name -> (module, class, what it is)
 METHODS = {
-    "alternating": ("contactopt.methods.alternating", "Alternating", "normal QP and tangential QP or SOCP in turn (paper, 5.1)"),
+    "alternating": (
+        "contactopt.methods.alternating",
+        "Alternating",
+        "normal QP and tangential QP or SOCP in turn (paper, 5.1)",
+    ),
 }
 
 
