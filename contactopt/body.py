@@ -123,11 +123,11 @@ def stiffness(basis: skfem.CellBasis, material: Material, weight: tuple[float, b
     dim = basis.mesh.p.shape[0]
     fields = [basis.basis[i][0] for i in range(0, basis.Nbfun, dim)]  # component 0 of every shape function
     g = np.stack([np.asarray(f.grad[0]) for f in fields])  # (i, a, element, point)
-    measure = basis.dx * weight_at(weight, basis.global_coordinates().value)
+    measure = basis.dx * weight_at(weight, np.asarray(basis.global_coordinates()))
     g = np.ascontiguousarray(np.moveaxis(g, (2, 0, 1, 3), (0, 1, 2, 3)))  # (element, i, a, point)
     divergence = g
     if weight[1]:
-        hoop = np.stack([np.asarray(f.value[0]) for f in fields], axis=1) / basis.global_coordinates().value[0][:, None]
+        hoop = np.stack([np.asarray(f)[0] for f in fields], axis=1) / np.asarray(basis.global_coordinates())[0][:, None]
         divergence = g.copy()
         divergence[:, :, 0] += hoop
     K = lam * _pairs(divergence, measure)

@@ -16,6 +16,7 @@ import scipy.linalg as la
 Projection = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 STEPS = 20
+RIDGE = 1e-10  # added to Q in the Newton systems: directions without compliance stay where they are
 GOOD = 1e-14  # dimensionless residual below which rounding is all that is left
 
 
@@ -74,7 +75,7 @@ def _newton_step(
         return np.einsum("iab,ibj->iaj", D[active], X.reshape(len(active), d, -1)).reshape(n, -1)
 
     system = np.zeros((n + p, n + p))
-    Q_active = Q[np.ix_(rows, rows)]
+    Q_active = Q[np.ix_(rows, rows)] + RIDGE * np.eye(n)
     system[:n, :n] = np.eye(n) - apply(np.eye(n) - Q_active)
     system[:n, n:] = apply(V[rows])
     system[n:, :n] = V[rows].T

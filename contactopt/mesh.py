@@ -48,7 +48,7 @@ def tensor_mesh(*grids: np.ndarray) -> MeshQuad | MeshHex:
 
 
 def rename(mesh: MeshQuad | MeshHex, **names: str) -> MeshQuad | MeshHex:
-    """The mesh with the boundaries of tensor_mesh under new names, e.g. rename(mesh, contact='y-')."""
+    """The mesh with boundaries of tensor_mesh under further names, e.g. rename(mesh, contact="y-")."""
     return mesh.with_boundaries({new: mesh.boundaries[old] for new, old in names.items()})
 
 

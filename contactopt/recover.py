@@ -94,7 +94,7 @@ def nodal_stress(body: Body, U: np.ndarray) -> np.ndarray:
     strain = np.zeros((3, 3, *gradient.shape[2:]))
     strain[:dim, :dim] = (gradient + gradient.swapaxes(0, 1)) / 2
     if body.weight[1]:
-        strain[2, 2] = np.asarray(field.value)[0] / basis.global_coordinates().value[0]
+        strain[2, 2] = np.asarray(field)[0] / np.asarray(basis.global_coordinates())[0]
     stress = 2 * shear * strain + lam * np.trace(strain) * np.eye(3)[:, :, None, None]
     volume = basis.dx.sum(axis=1)
     element = np.sum(stress * basis.dx, axis=3)  # integral over each element

@@ -254,6 +254,8 @@ def _interface(scene: Scene, upper: Body | None, lower: Body | None) -> tuple[An
         own = np.lexsort(body.points)
         nodes = (body.nodes[own], body.nodes[own])
         normals = sign * body.normals[:, own]
+        if rigid.normal is not None:
+            normals = np.tile(np.array(rigid.normal)[:, None] / np.linalg.norm(rigid.normal), len(own))
         areas = body.areas[own]
         gap = np.zeros(len(own)) if rigid.gap is None else np.asarray(rigid.gap(body.points[:, own]), dtype=float)
         if gap.shape != (len(own),) or not np.all(np.isfinite(gap)):

@@ -111,12 +111,14 @@ class Part:
 class Rigid:
     """A rigid body: its compliance is zero.
 
-    gap    function of the other body's contact nodes, coordinates (dim, k) -> initial gap (k,) [length];
-           None means touching everywhere.
+    normal the contact normal, one value per component; None: the normals of the other body's contact boundary
+    gap    function of the other body's contact nodes, coordinates (dim, k) -> initial gap (k,) along the normal
+           [length]; None means touching everywhere.
     force  None for an obstacle that does not move; otherwise, as in Plate, the total force on it by component.
     """
 
     name: str
+    normal: tuple[float, ...] | None = None
     gap: Callable[[np.ndarray], np.ndarray] | None = None
     force: Mapping[str, float] | None = None
 
@@ -176,6 +178,11 @@ class Scene:
     def _check_part(self, part: Part | Rigid) -> None:
         if isinstance(part, Rigid):
             self._check_components(part.name, part.force or {})
+            if part.normal is not None:
+                if len(part.normal) != self.dim or not np.any(part.normal):
+                    raise InputError(f"rigid body '{part.name}': its normal needs {self.dim} values, not all zero.")
+                for value in part.normal:
+                    check_number(f"every value of the normal of rigid body '{part.name}'", value)
             return
         for support in part.supports:
             self._check_components(part.name, support.displacement or {})

@@ -164,7 +164,7 @@ def sphere(
     top: Part | Rigid = Rigid("sphere", gap=gap, force=load)
     if rigid != "sphere":
         top = Part("sphere", sphere_mesh, upper, (axis,), (Plate("top", load),))
-    bottom: Part | Rigid = Rigid("foundation", gap=lambda x: x[1])
+    bottom: Part | Rigid = Rigid("foundation", normal=(0.0, 1.0), gap=lambda x: x[1])
     if rigid != "foundation":
         bottom = Part("foundation", foundation_mesh, lower, (axis, Support("bottom")))
     return Scene(

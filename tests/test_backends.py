@@ -1,0 +1,101 @@
+import numpy as np
+import pytest
+from conftest import one_contact
+
+from contactopt import BackendError, natural_map_residual, solve
+from contactopt.backends import CONIC, QP, Backend, find
+from contactopt.backends.conic import DiscSOCP
+from contactopt.backends.qp import BoxQP
+
+REQUIRED_QP = ("clarabel", "daqp", "ecos", "highs", "osqp", "piqp", "proxqp", "quadprog", "scs")
+REQUIRED_CONIC = ("clarabel", "ecos", "scs")
+
+
+@pytest.mark.parametrize("name", sorted(QP))
+def test_every_qp_backend_gives_the_same_certified_answer(name, punch):
+    if not QP[name].installed:
+        assert name not in REQUIRED_QP, f"install the test extra: {name} is missing"
+        pytest.skip(f"{name} is not installed")
+    best = solve(punch, tol=1e-12, max_iterations=100)
+    solution = solve(punch, normal=name, tangential=name, tol=1e-9)
+    assert solution.solved
+    assert solution.multipliers[0] == pytest.approx(best.multipliers[0], rel=1e-6)
+    assert solution.reactions[:, 0].max() == pytest.approx(best.reactions[:, 0].max(), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", sorted(CONIC))
+def test_every_conic_backend_gives_the_same_certified_answer(name, cube):
+    if not CONIC[name].installed:
+        assert name not in REQUIRED_CONIC, f"install the test extra: {name} is missing"
+        pytest.skip(f"{name} is not installed")
+    best = solve(cube, tol=1e-11)
+    solution = solve(cube, tangential=name, tol=1e-9)
+    assert solution.solved
+    assert np.allclose(solution.reactions, best.reactions, atol=1e-6 * np.abs(best.reactions).max())
+
+
+def test_unknown_and_missing_backends_say_what_to_do(monkeypatch):
+    with pytest.raises(BackendError, match="unknown qp backend 'simplex'; choose from clarabel"):
+        find("simplex", QP)
+    with pytest.raises(BackendError, match="pip install nowhere-solver"):
+        find("nowhere", {"nowhere": Backend("nowhere", "qp", "nowhere_solver", "nowhere-solver")})
+    with pytest.raises(BackendError, match="unknown qp backend"):
+        solve(one_contact((0.8, 1.0), 0.1), normal="simplex")
+
+
+def fake(monkeypatch, answer):
+    """Make proxqp answer with `answer(problem)`."""
+    import qpsolvers
+
+    class Answer:
+        y = None
+
+        def __init__(self, x):
+            self.x = x
+
+    monkeypatch.setattr(qpsolvers, "solve_problem", lambda problem, *_, **__: Answer(answer(problem)))
+
+
+@pytest.mark.parametrize(
+    "answer,words",
+    [
+        (lambda p: np.full(len(p.q), np.nan), "proxqp.*no answer"),
+        (lambda p: None, "proxqp.*no answer"),
+        (lambda p: 1 / 0, "proxqp.*failed: division by zero"),
+    ],
+)
+def test_a_backend_that_fails_is_a_status_that_names_it(monkeypatch, punch, answer, words):
+    fake(monkeypatch, answer)
+    solution = solve(punch)
+    assert solution.status.label == "backend_failed" and not solution.solved
+    assert __import__("re").search(words, solution.message)
+    assert solution.reactions.shape == punch.q.shape and np.all(np.isfinite(solution.reactions))
+
+
+def test_a_backend_that_lies_is_not_believed(monkeypatch, punch):
+    """Whatever it claims, the residual of what comes back is recomputed from the problem."""
+    fake(monkeypatch, lambda p: np.full(len(p.q), 5.0))
+    monkeypatch.setattr("contactopt.methods.alternating.crossover", lambda Q, c, V, s, P, r, lam: (r, lam))
+    solution = solve(punch, max_iterations=3)
+    assert not solution.solved
+    assert solution.residual == natural_map_residual(punch, solution.reactions, solution.multipliers) > 1e-3
+
+
+def test_box_qp_multiplier_sign():
+    """min x^2/2 - x subject to x = 2: P x + c + A'y = 0 gives y = -1."""
+    x, y = BoxQP.using("proxqp", np.eye(1), np.eye(1)).solve(-np.ones(1), np.array([2.0]), np.zeros(1), np.full(1, np.inf))
+    assert x[0] == pytest.approx(2) and y[0] == pytest.approx(-1)
+
+
+def test_socp_is_built_once_and_solved_for_new_parameters():
+    socp = DiscSOCP.using("clarabel", np.eye(2), np.zeros((0, 2)))
+    program = socp.program
+    for radius in (1.0, 3.0):
+        t, _ = socp.solve(np.array([-3.0, -4.0]), np.zeros(0), np.array([radius]))
+        assert np.allclose(t, radius * np.array([0.6, 0.8]), atol=1e-6)
+    assert socp.program is program and program.is_dcp(dpp=True)
+
+
+def test_indefinite_tangential_compliance_is_refused():
+    with pytest.raises(BackendError, match="not positive semidefinite"):
+        DiscSOCP.using("clarabel", np.diag([1.0, -1.0]), np.zeros((0, 2)))

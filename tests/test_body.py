@@ -1,0 +1,147 @@
+import numpy as np
+import pytest
+import skfem
+from conftest import MATERIAL, block, two_blocks
+from skfem.helpers import ddot, sym_grad, trace
+
+from contactopt import BodyForce, InputError, Material, Part, Plate, Scene, Support, Traction
+from contactopt.body import build_body, lame, weight_at
+
+KINDS = ["plane-strain", "axisymmetric", "solid"]
+
+
+def body_of(kind, **part):
+    scene = two_blocks(kind)
+    lower = scene.lower
+    part = Part(**(dict(name="b", mesh=lower.mesh, material=MATERIAL, supports=lower.supports, contact="top") | part))
+    return build_body(Scene("s", scene.upper, part, 0.0, kind=kind), part, 1, None)
+
+
+def triangulated(kind):
+    mesh = block(kind, -2, 0)
+    split = mesh.to_meshtri() if kind != "solid" else mesh.to_meshtet()
+    up = split.p[-1]
+    return split.with_boundaries(
+        {"top": lambda x: x[-1] == up.max(), "bottom": lambda x: x[-1] == up.min()}
+        | {f"side{i}": (lambda x, i=i: x[i] == 0) for i in range(len(split.p) - 1)}
+    )
+
+
+@pytest.mark.parametrize("simplices", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_stiffness_is_the_weak_form_of_elasticity(kind, simplices):
+    """Against scikit-fem's own assembly of sigma(u) : epsilon(v)."""
+    body = body_of(kind, mesh=triangulated(kind)) if simplices else body_of(kind)
+    lam, shear = lame(MATERIAL)
+
+    @skfem.BilinearForm
+    def elasticity(u, v, w):
+        volume, volume_v, energy = trace(sym_grad(u)), trace(sym_grad(v)), ddot(sym_grad(u), sym_grad(v))
+        if kind == "axisymmetric":
+            volume, volume_v = volume + u[0] / w.x[0], volume_v + v[0] / w.x[0]
+            energy = energy + u[0] * v[0] / w.x[0] ** 2
+        return (lam * volume * volume_v + 2 * shear * energy) * weight_at(body.weight, w.x)
+
+    expected = elasticity.assemble(body.basis)
+    assert abs(body.A - expected).max() <= 1e-13 * abs(expected).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_rigid_motions_cost_nothing(kind):
+    body = body_of(kind)
+    up = np.zeros(body.basis.N)
+    up[body.basis.nodal_dofs[-1]] = 1.0
+    assert np.abs(body.A @ up).max() < 1e-12 * abs(body.A).max()
+    if kind == "solid":
+        turn = np.zeros(body.basis.N)
+        turn[body.basis.nodal_dofs[0]], turn[body.basis.nodal_dofs[1]] = -body.basis.mesh.p[1], body.basis.mesh.p[0]
+        assert np.abs(body.A @ turn).max() < 1e-12 * abs(body.A).max()
+
+
+@pytest.mark.parametrize("kind,area,volume", [("plane-strain", 1, 2), ("axisymmetric", np.pi, 2 * np.pi), ("solid", 1, 2)])
+def test_areas_and_loads_add_up(kind, area, volume):
+    dim = 3 if kind == "solid" else 2
+    traction = Traction("top", tuple(np.arange(1.0, dim + 1)))
+    body = body_of(kind, loads=(traction,))
+    assert body.areas.sum() == pytest.approx(area)
+    for i in range(dim):
+        assert body.load[body.basis.nodal_dofs[i]].sum() == pytest.approx((i + 1) * area)
+    heavy = body_of(kind, loads=(BodyForce((0.0,) * (dim - 1) + (-2.0,)),))
+    assert heavy.load.sum() == pytest.approx(-2 * volume)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_normals_point_outward(kind):
+    assert np.allclose(body_of(kind).normals.T, np.eye(3 if kind == "solid" else 2)[-1])
+    assert np.allclose(body_of(kind, contact="bottom").normals.T, -np.eye(3 if kind == "solid" else 2)[-1])
+
+
+def test_normals_of_a_closed_surface_sum_to_zero():
+    mesh = skfem.MeshTri.init_circle(3).with_boundaries({"all": lambda x: np.ones_like(x[0], dtype=bool)})
+    part = Part("disc", mesh, MATERIAL, (Support("all"),), contact="all")
+    body = build_body(Scene("s", part, two_blocks("plane-strain").lower, 0.0), part, 1, None)
+    assert np.abs(body.normals @ body.areas).max() < 1e-12
+    assert np.all(np.sum(body.normals * body.points, axis=0) > 0)
+
+
+@pytest.mark.parametrize(
+    "kind,supports,motion",
+    [
+        ("plane-strain", (), "translation"),
+        ("plane-strain", ("side0",), "translation along y"),
+        ("plane-strain", ({"top": "y"},), "translation along x"),
+        ("solid", ("side0", "side1"), "translation along z"),
+        ("axisymmetric", ("side0",), "translation along z"),
+    ],
+)
+def test_a_body_that_may_move_is_refused(kind, supports, motion):
+    components = {"plane-strain": "xy", "axisymmetric": "rz", "solid": "xyz"}[kind]
+    chosen = []
+    for s in supports:
+        boundary, component = next(iter(s.items())) if isinstance(s, dict) else (s, components[int(s[-1])])
+        chosen.append(Support(boundary, {component: 0.0}))
+    with pytest.raises(InputError, match=f"free to move .*{motion}.*Support.*Plate"):
+        body_of(kind, supports=tuple(chosen))
+
+
+def test_a_rotation_about_one_held_node_is_found():
+    mesh = block("plane-strain", -2, 0).with_boundaries({"point": lambda x: (x[0] == 0) & (x[1] < -1.3)})
+    ends = mesh.facets[:, mesh.boundaries["point"]]
+    assert ends.size == 2
+    with pytest.raises(InputError, match="free to move"):
+        body_of("plane-strain", mesh=mesh, supports=(Support("point", {"x": 0.0}),))
+
+
+@pytest.mark.parametrize(
+    "change,message",
+    [
+        (dict(contact="face"), "no boundary named 'face'.*bottom"),
+        (dict(supports=(Support("floor"),)), "no boundary named 'floor'"),
+        (dict(mesh=skfem.MeshTet()), "dimension 2"),
+        (dict(loads=(Plate("bottom", {"y": -1.0}),)), "plate .* moves in y, but a support"),
+        (dict(supports=(Support("bottom"), Support("bottom", {"y": 1.0}))), "different value"),
+    ],
+)
+def test_bad_bodies_are_refused(change, message):
+    with pytest.raises(InputError, match=message):
+        body_of("plane-strain", **change)
+
+
+def test_a_mesh_in_two_pieces_is_refused():
+    mesh = block("plane-strain", -2, 0)
+    loose = type(mesh)(np.hstack([mesh.p, mesh.p + 9]), np.hstack([mesh.t, mesh.t + mesh.p.shape[1]]))
+    loose = loose.with_boundaries({"top": lambda x: x[1] == 0, "bottom": lambda x: x[1] == -2, "side0": lambda x: x[0] == 0})
+    with pytest.raises(InputError, match="2 pieces"):
+        body_of("plane-strain", mesh=loose)
+
+
+def test_negative_radius_is_refused():
+    mesh = block("axisymmetric", -2, 0)
+    with pytest.raises(InputError, match="r >= 0"):
+        body_of("axisymmetric", mesh=mesh.translated((-0.5, 0.0)))
+
+
+@pytest.mark.parametrize("E,nu", [(0, 0.3), (-1, 0.3), (np.nan, 0.3), (1, 0.5), (1, -1), (1, np.inf), ("5", 0.3)])
+def test_bad_materials_are_refused(E, nu):
+    with pytest.raises(InputError, match="must be a finite number"):
+        Material(E, nu)

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from skfem import Basis, ElementQuad1, Functional
+
+from contactopt.mesh import contact_grid, graded, half_sphere_section, patch, rename, tensor_mesh
+
+
+@given(st.floats(0.1, 1e4), st.floats(1e-3, 2), st.floats(1.05, 2))
+def test_graded_grids_end_where_they_should_and_grow_slowly(length, fraction, growth):
+    grid = graded(length, fraction * length, growth)
+    steps = np.diff(grid)
+    assert grid[0] == 0 and grid[-1] == pytest.approx(length)
+    assert np.all(steps > 0)
+    assert np.all(steps[1:] <= growth * steps[:-1] * (1 + 1e-6))
+    assert np.all(steps[1:] >= steps[:-1] * (1 - 1e-6))
+    assert steps[0] <= fraction * length * (1 + 1e-9)
+
+
+def test_contact_grid_is_uniform_on_the_contact():
+    grid = contact_grid(2.0, 8, 20.0, 1.3)
+    assert np.allclose(grid[:9], np.linspace(0, 2, 9))
+    assert grid[-1] == pytest.approx(20.0)
+    assert np.array_equal(contact_grid(2.0, 4, 2.0, 1.3), np.linspace(0, 2, 5))
+
+
+def test_half_sphere_section_is_a_quarter_disc_with_positive_elements():
+    radius = 50.0
+    grid = contact_grid(4.0, 16, radius / np.sqrt(2), 1.2)
+    mesh = half_sphere_section(radius, grid, graded(radius, 0.25, 1.2) / radius)
+    basis = Basis(mesh, ElementQuad1())
+    assert np.all(basis.dx > 0)
+    volume = Functional(lambda w: 2 * np.pi * w.x[0]).assemble(basis)
+    assert volume == pytest.approx(2 / 3 * np.pi * radius**3, rel=2e-3)
+    arc = mesh.p[:, np.unique(mesh.facets[:, mesh.boundaries["arc"]])]
+    assert np.allclose(np.hypot(arc[0], arc[1] - radius), radius)
+    assert np.allclose(mesh.p[0, mesh.facets[:, mesh.boundaries["axis"]]], 0)
+    assert np.allclose(mesh.p[1, mesh.facets[:, mesh.boundaries["top"]]], radius)
+
+
+def test_boundaries_of_a_box_and_a_patch_of_one():
+    mesh = rename(tensor_mesh(*[np.linspace(0, 1, 5)] * 3), top="z+", bottom="z-")
+    assert {"top", "bottom"} <= set(mesh.boundaries)
+    mesh = patch(mesh, "top", "contact", [0.5, 0.25])
+    assert len(mesh.boundaries["contact"]) == 2 and len(mesh.boundaries["top"]) == 16

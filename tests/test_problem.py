@@ -1,0 +1,118 @@
+import numpy as np
+import pytest
+from conftest import one_contact
+
+from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
+from contactopt.problem import balance_residual, dimensionless, fit_multipliers
+
+
+@pytest.mark.parametrize("reaction", [(1.0, 0.8), (0.4, 0.4), (0.0, 0.0)])
+def test_the_three_solutions_of_one_contact_have_residual_zero(reaction):
+    """Stick, slip and open all solve this problem; (normal, tangential)."""
+    problem = one_contact((0.8, 1.0), mu=1.0)
+    assert natural_map_residual(problem, [reaction]) < 1e-14
+
+
+@pytest.mark.parametrize("reaction", [(1.0, 0.7), (0.4, -0.4), (0.5, 0.5), (1.0, 1.1), (-0.1, 0.0)])
+def test_what_does_not_solve_has_a_large_residual(reaction):
+    assert natural_map_residual(one_contact((0.8, 1.0), mu=1.0), [reaction]) > 1e-2
+
+
+def test_rho_one_is_the_published_formula():
+    rng = np.random.default_rng(0)
+    A = rng.normal(size=(6, 6))
+    problem = InterfaceProblem(A @ A.T, rng.normal(size=(2, 3)), 0.5)
+    r = rng.normal(size=(2, 3))
+    u = (problem.Q @ r.ravel()).reshape(2, 3) + problem.q
+    error = np.zeros((2, 3))
+    for i in range(2):
+        x = r[i] - u[i]
+        x[0] -= 0.5 * np.linalg.norm(u[i, 1:])
+        n, t = x[0], np.linalg.norm(x[1:])
+        if t <= 0.5 * n:
+            p = x
+        elif 0.5 * t <= -n:
+            p = np.zeros(3)
+        else:
+            h = (n + 0.5 * t) / 1.25
+            p = np.array([h, *(0.5 * h * x[1:] / t)])
+        error[i] = r[i] - p
+    size = max(np.linalg.norm(r), np.linalg.norm(problem.q), np.linalg.norm(u))
+    assert natural_map_residual(problem, r, rho=1.0) == pytest.approx(np.linalg.norm(error) / size, rel=1e-12)
+
+
+@pytest.mark.parametrize("force,length", [(1e6, 1e-3), (1e-9, 1e3), (1.0, 1e-9)])
+def test_certificate_and_scaling_do_not_depend_on_units(punch, force, length):
+    units = InterfaceProblem(
+        punch.Q * length / force, punch.q * length, punch.mu, punch.V, punch.s * force, areas=punch.areas
+    )
+    r = np.abs(np.random.default_rng(0).normal(size=punch.q.shape))
+    assert natural_map_residual(units, r * force) == pytest.approx(natural_map_residual(punch, r), rel=1e-6)
+    for a, b in ((dimensionless(units)[0], dimensionless(punch)[0]),):
+        assert np.allclose(a.Q, b.Q, rtol=1e-12, atol=0)
+        assert np.allclose(a.s, b.s, rtol=1e-12)
+    ours, base = solve(units, tol=1e-10), solve(punch, tol=1e-10)
+    assert ours.solved and np.allclose(ours.reactions / force, base.reactions, rtol=0, atol=1e-8)
+
+
+def test_zero_reactions_are_no_solution_of_a_pressed_problem(punch):
+    assert natural_map_residual(punch, np.zeros(punch.q.shape)) == 1.0
+
+
+def test_unloaded_problem_at_rest():
+    problem = InterfaceProblem(np.eye(2), np.zeros((1, 2)), 0.3)
+    assert natural_map_residual(problem, np.zeros((1, 2))) == 0.0
+
+
+def test_bilateral_contact_carries_tension_and_its_friction():
+    problem = InterfaceProblem(np.eye(2), [[2.0, 0.5]], 0.3, bilateral=True)  # r_n = -2 keeps u_n = 0
+    assert natural_map_residual(problem, [[-2.0, -0.5]]) < 1e-15
+    assert natural_map_residual(problem, [[0.0, 0.0]]) > 0.1
+    slipping = InterfaceProblem(np.eye(2), [[2.0, 0.9]], 0.3, bilateral=True)
+    assert natural_map_residual(slipping, [[-2.0, -0.6]]) < 1e-15
+
+
+def test_balance_counts(punch):
+    r = solve(punch, tol=1e-10).reactions.copy()
+    r[:, 0] *= 1.01
+    assert balance_residual(punch, r) == pytest.approx(0.01 / 2.01, rel=1e-6)
+    assert natural_map_residual(punch, r) >= balance_residual(punch, r)
+
+
+def test_multipliers_are_found_from_the_reactions(punch):
+    solution = solve(punch, tol=1e-10)
+    assert np.allclose(fit_multipliers(punch, solution.reactions), solution.multipliers, rtol=1e-8)
+
+
+def test_reactions_that_are_not_finite(punch):
+    assert natural_map_residual(punch, np.full(punch.q.shape, np.nan)) == np.inf
+
+
+@pytest.mark.parametrize(
+    "change,message",
+    [
+        (dict(mu=[-0.1]), "must not be negative"),
+        (dict(mu=[np.nan]), "not finite"),
+        (dict(Q=np.eye(3)), "Q must have shape"),
+        (dict(Q=np.array([[1.0, 0.5], [0.0, 1.0]])), "symmetric"),
+        (dict(q=np.zeros((1, 4))), "2 or 3 columns"),
+        (dict(s=np.ones(1)), "V must have shape"),
+    ],
+)
+def test_bad_problems_are_refused(change, message):
+    good = dict(Q=np.eye(2), q=np.zeros((1, 2)), mu=[0.5])
+    with pytest.raises(InputError, match=message):
+        InterfaceProblem(**(good | change))
+
+
+def test_wrong_shape_of_reactions(punch):
+    with pytest.raises(InputError, match="normal first"):
+        natural_map_residual(punch, np.zeros(3))
+
+
+def test_problem_is_frozen_and_has_a_fingerprint(punch):
+    with pytest.raises(ValueError):
+        punch.Q[0, 0] = 1.0
+    again = reduce(scenes.flat_punch(2, elements=8))
+    other = reduce(scenes.flat_punch(2, elements=8, mu=0.4))
+    assert punch.fingerprint == again.fingerprint != other.fingerprint
