@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from contactopt.backends import CONIC, QP
-from contactopt.errors import BackendError, InputError
+from contactopt.errors import InputError
 from contactopt.methods import METHODS
 from contactopt.scenes import SCENES
 
@@ -17,7 +17,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         return int(options.command(options))
-    except (InputError, BackendError) as error:
+    except InputError as error:
         print(f"contactopt: {error}", file=sys.stderr)
         return 2
 

@@ -8,6 +8,7 @@ wherever force and gap vanish together; from the active set it suggests, Newton'
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -85,7 +86,9 @@ def _newton_step(
     if n + p == 0:
         return dr.reshape(k, d), np.zeros(p)
     try:
-        step = la.solve(system, right, check_finite=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", la.LinAlgWarning)  # a bad step is seen by its residual
+            step = la.solve(system, right, check_finite=False)
     except (la.LinAlgError, ValueError):
         return None
     if not np.all(np.isfinite(step)):

@@ -36,8 +36,8 @@ def solve(
     change_tol      the paper's criterion |r_t - r_t previous| / |r_t| <= change_tol (1e-5 there), None: not used. If
                     it is met first the iteration ends, with status `settled` unless the certificate agrees
     progress        called with (iteration, residual) after each outer iteration
-    Raises InputError on arguments that make no sense or a load that pulls the bodies apart, BackendError if a backend
-    is unknown or not installed. A backend that fails while solving is a status, with the last iterate.
+    Raises InputError on arguments that make no sense, an unknown or missing backend, or a load that pulls the bodies
+    apart. A backend that fails while solving is a status, with the last iterate.
     """
     check_number("tol", tol, low=0.0)
     check_number("max_iterations", max_iterations, low=0.0)

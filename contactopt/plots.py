@@ -10,7 +10,7 @@ import numpy as np
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.recover import Fields
 from contactopt.scene import Scene
-from contactopt.zone import contact_half_width, pressed, stuck
+from contactopt.zone import contact_area, contact_half_width, pressed, stuck
 
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
 LENGTH, STRESS = "mm", "MPa"  # the named scenes' units
@@ -132,8 +132,8 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     x = problem.coordinates[0, line]
     p = solution.reactions[line, 0] / problem.areas[line]
     a = contact_half_width(scene, problem, solution.reactions)
-    active = pressed(solution.reactions)
-    mean = solution.reactions[active, 0].sum() / problem.areas[active].sum() if active.any() else 1.0
+    mean = solution.reactions[:, 0].sum() / contact_area(scene, a) if a > 0 else 0.0
+    a, mean = a or 1.0, mean or 1.0
     ax.plot(x / a, p / mean, "o-", color=BLUE, ms=4, lw=1, label="contactopt")
     if scene.reference is not None:
         fine = np.linspace(x.min(), x.max(), 801)
@@ -145,7 +145,7 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     ax.set(
         xlabel=f"{across} / a [-]{where}, a = {a:.4g} {LENGTH}",
         ylabel=f"p / mean p [-], mean p = {mean:.4g} {STRESS}",
-        ylim=(0, 1.15 * max(1e-300, (p / mean).max())),
+        ylim=(0, 1.15 * float((p / mean).max() or 1.0)),
     )
     ax.legend(frameon=False)
     return ax

@@ -36,19 +36,14 @@ class Fields:
 
     def write_vtu(self, path: Path) -> None:
         """The body as a VTU file with displacement, stress components and von Mises stress at the nodes."""
-        import meshio
+        from skfem.io.meshio import to_meshio
 
         flat = {f"stress_{name}": column for name, column in zip(self.names, self.stress.T)}
-        points, displacement = (np.pad(a, ((0, 3 - len(a)), (0, 0))).T for a in (self.mesh.p, self.displacement))
-        data = {"displacement": displacement, "von_mises": self.von_mises, **flat}
-        kind = {"RefTri": "triangle", "RefQuad": "quad", "RefTet": "tetra", "RefHex": "hexahedron"}
-        name = self.mesh.refdom.__name__
-        cells = self.mesh.t[_VTK_ORDER.get(name, slice(None))].T
-        meshio.Mesh(points, [(kind[name], cells)], point_data=data).write(path, file_format="vtu")
-
-
-# scikit-fem's order of a hexahedron's corners -> VTK's
-_VTK_ORDER = {"RefHex": np.array([0, 1, 4, 2, 3, 6, 7, 5])}
+        vectors = np.pad(self.displacement, ((0, 3 - len(self.displacement)), (0, 0))).T
+        data = {"displacement": vectors, "von_mises": self.von_mises, **flat}
+        mesh = to_meshio(self.mesh, point_data=data, encode_cell_data=False, encode_point_data=False)
+        mesh.points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
+        mesh.write(path, file_format="vtu")
 
 
 def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:

@@ -69,7 +69,7 @@ def run(
     scene     a name (see contactopt.scenes.SCENES), `changes` to its arguments; or a Scene, `changes` to its fields
     method, normal, tangential   names; None is the method's default backend
     elements  across the contact half-width;  tol  bound on the natural-map residual;  note  receives progress messages
-    Raises InputError and BackendError with a sentence that says what to do; nothing is left half-written.
+    Raises InputError with a sentence that says what to do; nothing is left half-written.
     """
     start = time.perf_counter()
     if elements is not None:
@@ -77,12 +77,13 @@ def run(
     scene = make_scene(scene, **changes) if isinstance(scene, str) else _changed(scene, changes)
     given = {"normal": normal, "tangential": tangential}
     chosen = find_method(method, **{k: v for k, v in given.items() if v is not None})
+    backends = chosen.backends(scene.dim)  # refused here, before any work, if one of them cannot be used
     target = None if out is None else _writable(Path(out))
     reduction, solution, zones = solve_zone(scene, note=note, method=chosen, tol=tol)
     seconds = dict(solution.seconds)
     with _Timer(seconds, "recover"):
         fields = recover(reduction, solution)
-    summary = _summary(scene, reduction, solution, method, chosen, zones)
+    summary = _summary(scene, reduction, solution, method, backends, zones)
     result = Result(scene, reduction, solution, fields, tuple(zones), summary)
     summary["seconds"] = seconds
     if target is not None:
@@ -100,10 +101,9 @@ def _changed(scene: Scene, changes: dict[str, Any]) -> Scene:
 
 
 def _summary(
-    scene: Scene, reduction: Reduction, solution: Solution, method: str, chosen: Any, zones: list[float]
+    scene: Scene, reduction: Reduction, solution: Solution, method: str, backends: tuple[str, str], zones: list[float]
 ) -> dict[str, Any]:
     problem, r = reduction.problem, solution.reactions
-    normal, tangential = chosen.backends(problem.dim)
     width = zones[-1] if zones else contact_half_width(scene, problem, r)
     return {
         "scene": scene.name,
@@ -111,8 +111,8 @@ def _summary(
         "contact_nodes": problem.contacts,
         "mu": float(scene.mu),
         "method": method,
-        "normal_backend": normal,
-        "tangential_backend": tangential,
+        "normal_backend": backends[0],
+        "tangential_backend": backends[1],
         "status": solution.status.label,
         "residual": float(solution.residual),
         "outer_iterations": solution.iterations,

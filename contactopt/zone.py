@@ -38,6 +38,13 @@ def equivalent_half_width(scene: Scene, area: float) -> float:
     return float(np.sqrt(area / np.pi) if scene.kind == "axisymmetric" else np.sqrt(area) / 2)
 
 
+def contact_area(scene: Scene, half_width: float) -> float:
+    """The inverse of equivalent_half_width."""
+    if scene.kind == "plane-strain":
+        return 2 * half_width * scene.thickness
+    return float(np.pi * half_width**2 if scene.kind == "axisymmetric" else 4 * half_width**2)
+
+
 def contact_half_width(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
     """Half-width of the contact zone [length], below the element size where the zone has a smooth edge.
 

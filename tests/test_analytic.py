@@ -26,7 +26,9 @@ def test_pressures_carry_the_load():
     b = line.half_width
     assert quad(lambda x: line.pressure(np.array(x)), -b, b)[0] == pytest.approx(7)
     # x = a sin(t) removes the edge singularity
-    assert quad(lambda t: punch.pressure(20 * np.sin(t)) * 20 * np.cos(t), -1.57079, 1.57079)[0] == pytest.approx(7, rel=1e-4)
+    assert quad(lambda t: punch.pressure(20 * np.sin(t)) * 20 * np.cos(t), -1.57079, 1.57079)[0] == pytest.approx(
+        7, rel=1e-4
+    )
     assert not np.any(point.pressure(np.array([a * 1.01])))
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from conftest import one_contact
 
-from contactopt import BackendError, natural_map_residual, solve
+from contactopt import BackendError, InputError, natural_map_residual, solve
 from contactopt.backends import CONIC, QP, Backend, find
 from contactopt.backends.conic import DiscSOCP
 from contactopt.backends.qp import BoxQP
@@ -35,11 +35,11 @@ def test_every_conic_backend_gives_the_same_certified_answer(name, cube):
 
 
 def test_unknown_and_missing_backends_say_what_to_do(monkeypatch):
-    with pytest.raises(BackendError, match="unknown qp backend 'simplex'; choose from clarabel"):
+    with pytest.raises(InputError, match="unknown qp backend 'simplex'; choose from clarabel"):
         find("simplex", QP)
-    with pytest.raises(BackendError, match="pip install nowhere-solver"):
+    with pytest.raises(InputError, match="pip install nowhere-solver"):
         find("nowhere", {"nowhere": Backend("nowhere", "qp", "nowhere_solver", "nowhere-solver")})
-    with pytest.raises(BackendError, match="unknown qp backend"):
+    with pytest.raises(InputError, match="unknown qp backend"):
         solve(one_contact((0.8, 1.0), 0.1), normal="simplex")
 
 
@@ -83,7 +83,9 @@ def test_a_backend_that_lies_is_not_believed(monkeypatch, punch):
 
 def test_box_qp_multiplier_sign():
     """min x^2/2 - x subject to x = 2: P x + c + A'y = 0 gives y = -1."""
-    x, y = BoxQP.using("proxqp", np.eye(1), np.eye(1)).solve(-np.ones(1), np.array([2.0]), np.zeros(1), np.full(1, np.inf))
+    x, y = BoxQP.using("proxqp", np.eye(1), np.eye(1)).solve(
+        -np.ones(1), np.array([2.0]), np.zeros(1), np.full(1, np.inf)
+    )
     assert x[0] == pytest.approx(2) and y[0] == pytest.approx(-1)
 
 

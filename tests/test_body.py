@@ -58,7 +58,9 @@ def test_rigid_motions_cost_nothing(kind):
         assert np.abs(body.A @ turn).max() < 1e-12 * abs(body.A).max()
 
 
-@pytest.mark.parametrize("kind,area,volume", [("plane-strain", 1, 2), ("axisymmetric", np.pi, 2 * np.pi), ("solid", 1, 2)])
+@pytest.mark.parametrize(
+    "kind,area,volume", [("plane-strain", 1, 2), ("axisymmetric", np.pi, 2 * np.pi), ("solid", 1, 2)]
+)
 def test_areas_and_loads_add_up(kind, area, volume):
     dim = 3 if kind == "solid" else 2
     traction = Traction("top", tuple(np.arange(1.0, dim + 1)))
@@ -130,7 +132,9 @@ def test_bad_bodies_are_refused(change, message):
 def test_a_mesh_in_two_pieces_is_refused():
     mesh = block("plane-strain", -2, 0)
     loose = type(mesh)(np.hstack([mesh.p, mesh.p + 9]), np.hstack([mesh.t, mesh.t + mesh.p.shape[1]]))
-    loose = loose.with_boundaries({"top": lambda x: x[1] == 0, "bottom": lambda x: x[1] == -2, "side0": lambda x: x[0] == 0})
+    loose = loose.with_boundaries(
+        {"top": lambda x: x[1] == 0, "bottom": lambda x: x[1] == -2, "side0": lambda x: x[0] == 0}
+    )
     with pytest.raises(InputError, match="2 pieces"):
         body_of("plane-strain", mesh=loose)
 

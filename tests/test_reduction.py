@@ -5,7 +5,19 @@ import pytest
 import scipy.sparse as sp
 from conftest import MATERIAL, block, two_blocks
 
-from contactopt import InputError, Material, Part, Plate, Rigid, Scene, Support, Traction, reduce, reduce_bodies, scenes, solve
+from contactopt import (
+    InputError,
+    Material,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    reduce,
+    reduce_bodies,
+    scenes,
+    solve,
+)
 from contactopt.dissection import nested_dissection
 from contactopt.recover import recover
 
@@ -53,7 +65,9 @@ def test_schur_complement_is_the_inverse_of_the_compliance():
     assert np.abs(S @ body.compliance - np.eye(len(S))).max() < 1e-10
 
 
-@pytest.mark.parametrize("scene", [scenes.flat_punch(2, elements=4), scenes.flat_punch(3, elements=3), scenes.sphere(elements=6)])
+@pytest.mark.parametrize(
+    "scene", [scenes.flat_punch(2, elements=4), scenes.flat_punch(3, elements=3), scenes.sphere(elements=6)]
+)
 def test_recovered_bodies_are_in_equilibrium_and_meet_the_interface_equation(scene):
     reduction = reduce_bodies(scene)
     problem = reduction.problem

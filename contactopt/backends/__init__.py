@@ -12,7 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any
 
-from contactopt.errors import BackendError
+from contactopt.errors import InputError
 
 TIGHT = 1e-9  # accuracy asked of every backend, in dimensionless units
 
@@ -90,11 +90,11 @@ CONIC: dict[str, Backend] = {
 
 
 def find(name: str, table: Mapping[str, Backend]) -> Backend:
-    """The backend of that name; BackendError with what to do if it is unknown or not installed."""
+    """The backend of that name; InputError with what to do if it is unknown or not installed."""
     if name not in table:
         kind = next(iter(table.values())).kind
-        raise BackendError(f"unknown {kind} backend {name!r}; choose from {', '.join(sorted(table))}.")
+        raise InputError(f"unknown {kind} backend {name!r}; choose from {', '.join(sorted(table))}.")
     backend = table[name]
     if not backend.installed:
-        raise BackendError(f"backend '{name}' is not installed; install it with: pip install {backend.package}")
+        raise InputError(f"backend '{name}' is not installed; install it with: pip install {backend.package}")
     return backend

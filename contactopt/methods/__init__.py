@@ -20,6 +20,9 @@ from contactopt.problem import InterfaceProblem
 class Method(Protocol):
     def iterate(self, problem: InterfaceProblem) -> Iterator[tuple[np.ndarray, np.ndarray]]: ...
 
+    def backends(self, dim: int) -> tuple[str, str]:
+        """Names of the normal and tangential backend in `dim` dimensions; InputError if one cannot be used."""
+
 
 # name -> (module, class, what it is)
 METHODS = {

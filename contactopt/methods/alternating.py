@@ -39,19 +39,19 @@ class Alternating:
 
     def __post_init__(self) -> None:
         check_number("the relaxation", self.relaxation, low=0.0, high=1.0 + 1e-12)
-        find(self.normal, QP)
-        if self.tangential is not None:
-            find(self.tangential, QP if self.tangential not in CONIC else CONIC)
 
     def backends(self, dim: int) -> tuple[str, str]:
-        """Names of the normal and the tangential backend for that dimension."""
-        return self.normal, self.tangential or ("proxqp" if dim == 2 else "clarabel")
+        tangential = self.tangential or ("proxqp" if dim == 2 else "clarabel")
+        return find(self.normal, QP).name, find(tangential, QP if dim == 2 else CONIC).name
 
     def iterate(self, problem: InterfaceProblem) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         k, p = problem.contacts, len(problem.s)
-        pushes = np.any(np.abs(_rows(problem.V, problem.dim, normal=True)) > 1e-9, axis=0)
-        normal = NormalProblem(self.normal, problem, pushes)
-        tangential = TangentialProblem(self.backends(problem.dim)[1], problem, ~pushes)
+        pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)  # columns with normal entries
+        backends = self.backends(problem.dim)
+        normal, tangential = (
+            NormalProblem(backends[0], problem, pushes),
+            TangentialProblem(backends[1], problem, ~pushes),
+        )
         r_n, r_t, multipliers = np.zeros(k), np.zeros((k, problem.dim - 1)), np.zeros(p)
         while True:
             r_n, multipliers[pushes] = normal.solve(r_t, r_n, multipliers)
@@ -63,10 +63,6 @@ class Alternating:
 def _index(k: int, dim: int, normal: bool) -> np.ndarray:
     blocks = np.arange(k * dim).reshape(k, dim)
     return blocks[:, 0] if normal else blocks[:, 1:].ravel()
-
-
-def _rows(V: np.ndarray, dim: int, normal: bool) -> np.ndarray:
-    return V[_index(len(V) // dim, dim, normal)]
 
 
 class NormalProblem:

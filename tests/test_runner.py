@@ -1,0 +1,155 @@
+import json
+import os
+
+import numpy as np
+import pytest
+from conftest import two_blocks
+
+import contactopt
+from contactopt import InputError, cli, run
+
+KEYS = [
+    "scene",
+    "dofs",
+    "contact_nodes",
+    "mu",
+    "method",
+    "normal_backend",
+    "tangential_backend",
+    "status",
+    "residual",
+    "outer_iterations",
+    "normal_force",
+    "approach",
+    "contact_half_width",
+    "stick_half_width",
+    "max_pressure",
+    "seconds",
+]
+SMALL = {"punch-2d": 6, "punch-3d": 3, "sphere": 8}
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_run_writes_everything(name, tmp_path):
+    result = run(name, tmp_path / "new" / "folder", elements=SMALL[name])
+    out = tmp_path / "new" / "folder"
+    names = {f.name for f in result.fields}
+    assert {p.name for p in out.iterdir()} == {
+        "summary.json", "deformed.png", "pressure.png", "interface.npz", *(f"{n}.vtu" for n in names)
+    }  # fmt: skip
+    summary = json.loads((out / "summary.json").read_text())
+    assert list(summary) == KEYS
+    assert summary["status"] == "solved" and summary["residual"] <= 1e-8
+    assert summary["normal_force"] == pytest.approx(100, rel=1e-8)
+    assert 0 < summary["stick_half_width"] <= summary["contact_half_width"]
+    assert summary["seconds"]["total"] >= max(v for k, v in summary["seconds"].items() if k != "total")
+    data = np.load(out / "interface.npz")
+    k = summary["contact_nodes"]
+    shape = (k, 2) if name == "punch-3d" else (k,)
+    assert data["x"].shape == data["r_t"].shape == data["traction"].shape == shape
+    assert data["r_n"].sum() == pytest.approx(100, rel=1e-8)
+    assert data["pressure"].max() == pytest.approx(summary["max_pressure"])
+    assert result.solution.reactions.shape == (k, result.problem.dim)
+
+
+def test_run_from_python_without_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = run("punch-2d", mu=0.3, elements=4, tol=1e-6, normal="osqp", tangential="daqp")
+    assert not list(tmp_path.iterdir())
+    assert result.summary["mu"] == 0.3 and result.summary["normal_backend"] == "osqp"
+    assert result.pressure.shape == result.traction.shape == (5,)
+
+
+def test_run_takes_a_users_scene(tmp_path):
+    result = run(two_blocks("solid", mu=0.2), tmp_path, mu=0.1)
+    assert result.summary["mu"] == 0.1 and result.summary["status"] == "solved"
+    assert result.summary["approach"] > 0
+
+
+def test_a_body_without_plate_has_no_approach():
+    from dataclasses import replace
+
+    from contactopt import Support
+
+    base = two_blocks("plane-strain")
+    driven = replace(base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -0.1})))
+    assert run(replace(base, upper=driven)).summary["approach"] is None
+
+
+def test_docstring_names_exist():
+    for name in contactopt.__all__:
+        assert getattr(contactopt, name) is not None
+    assert callable(contactopt.solve) and callable(contactopt.run) and callable(contactopt.reduce)
+    with pytest.raises(AttributeError):
+        contactopt.nothing  # noqa: B018
+
+
+def test_command_line_runs(tmp_path, capsys):
+    assert cli.main(["run", "punch-2d", "--out", str(tmp_path), "--elements", "4", "--mu", "0.2", "--tol", "1e-7"]) == 0
+    text = capsys.readouterr()
+    assert "solved" in text.out and "approach" in text.out and "reducing" in text.err
+    assert json.loads((tmp_path / "summary.json").read_text())["mu"] == 0.2
+
+
+def test_command_line_reports_what_is_not_solved(tmp_path, capsys):
+    assert cli.main(["run", "punch-2d", "--out", str(tmp_path), "--elements", "4", "--tol", "1e-30"]) == 1
+    assert json.loads((tmp_path / "summary.json").read_text())["status"] in ("stalled", "cycling", "iteration_limit")
+
+
+def test_list(capsys):
+    assert cli.main(["list"]) == 0
+    text = capsys.readouterr().out
+    for word in ("punch-2d", "punch-3d", "sphere", "alternating", "proxqp", "clarabel", "installed"):
+        assert word in text
+
+
+@pytest.mark.parametrize(
+    "arguments,words",
+    [
+        (["nowhere"], "unknown scene 'nowhere'; choose from punch-2d, punch-3d, sphere"),
+        (["punch-2d", "--normal", "simplex"], "unknown qp backend 'simplex'; choose from clarabel"),
+        (["punch-3d", "--tangential", "proxqp"], "unknown conic backend 'proxqp'; choose from clarabel"),
+        (["punch-2d", "--method", "magic"], "unknown method 'magic'; choose from alternating"),
+        (["punch-2d", "--mu", "-1"], "mu must be a finite number at least 0"),
+        (["punch-2d", "--mu", "nan"], "mu must be a finite number"),
+        (["punch-2d", "--elements", "0"], "elements must be a whole number"),
+        (["punch-2d", "--tol", "0"], "tol must be a finite number"),
+        (["sphere", "--force", "1e9"], "too much for a sphere"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_writes_nothing(arguments, words, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert cli.main(["run", *arguments, "--out", str(out)]) == 2
+    text = capsys.readouterr().err
+    lines = [line for line in text.splitlines() if not line.startswith("  ")]
+    assert len(lines) == 1 and words in lines[0]
+    assert not out.exists()
+
+
+def test_an_output_that_is_a_file_is_refused_before_any_work(tmp_path, capsys):
+    (tmp_path / "taken").write_text("mine")
+    for path in ("taken", "taken/deeper"):
+        assert cli.main(["run", "punch-2d", "--out", str(tmp_path / path)]) == 2
+        text = capsys.readouterr().err
+        assert "cannot write into" in text and "reducing" not in text
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_read_only_output_is_refused(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(InputError, match="cannot write"):
+        run("punch-2d", tmp_path / "out", elements=4)
+
+
+def test_a_failure_while_writing_leaves_old_results_alone(tmp_path, monkeypatch):
+    run("punch-2d", tmp_path, elements=4)
+    before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+
+    def broken(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("contactopt.runner._write_interface", broken)
+    with pytest.raises(InputError, match="No space left"):
+        run("punch-2d", tmp_path, elements=4, mu=0.1)
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
