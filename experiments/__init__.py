@@ -1,0 +1,1 @@
+"""One question each; run with `python -m experiments.NAME`, which writes reports/NAME/."""

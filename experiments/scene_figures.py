@@ -1,0 +1,17 @@
+"""What do the paper's scenes look like? Its figures 1, 2, 3a and 3b for ours, into reports/figures/."""
+
+from __future__ import annotations
+
+from contactopt import plots, run
+from contactopt.scenes import SCENES
+from experiments.report import REPORTS
+
+if __name__ == "__main__":
+    folder = REPORTS / "figures"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in SCENES:
+        result = run(name)
+        picture = plots.deformed(result.scene, result.problem, result.fields).figure
+        picture.savefig(folder / f"{name}-deformed.png", dpi=100)
+        contact = plots.contact_figure(result.scene, result.problem, result.solution)
+        contact.savefig(folder / f"{name}-pressure.png", dpi=100)
