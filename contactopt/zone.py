@@ -94,7 +94,7 @@ def solve_zone(
             return reduction, solution, []
         width = contact_half_width(scene, reduction.problem, solution.reactions)
         if pressed(solution.reactions).sum() < 2:
-            raise InputError(f"scene '{scene.name}': no contact zone to resolve; bring the bodies into contact.")
+            raise InputError(f"scene '{scene.name}': fewer than two nodes are in contact; take more elements.")
         agreed = abs(width - zones[-1]) <= AGREE * zones[-1] / elements
         zones.append(width)
         if agreed or not solution.solved or len(zones) > LOOPS:
