@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from contactopt.backends import CONIC, QP
 from contactopt.errors import InputError
-from contactopt.methods import METHODS
+from contactopt.methods import METHODS, NATIVE
 from contactopt.scenes import SCENES
 
 
@@ -29,7 +29,7 @@ def _parser() -> argparse.ArgumentParser:
     run.set_defaults(command=_run)
     run.add_argument("scene", metavar="SCENE", help=", ".join(SCENES))
     run.add_argument("--out", metavar="DIR", help="where files go (default: out/SCENE)")
-    run.add_argument("--method", default="alternating", help=", ".join(METHODS))
+    run.add_argument("--method", help=", ".join(METHODS) + " (auto, or alternating if a backend is named)")
     run.add_argument("--normal", metavar="BACKEND", help="QP backend of the normal problem")
     run.add_argument("--tangential", metavar="BACKEND", help="QP (2D, axisymmetric) or conic (3D) backend")
     run.add_argument("--mu", type=float, metavar="X", help="friction coefficient")
@@ -60,7 +60,9 @@ def _run(options: argparse.Namespace) -> int:
     s = result.summary
     print(f"{s['scene']}: {s['dofs']} unknowns, {s['contact_nodes']} contact nodes, mu = {s['mu']:g}")
     print(f"{s['status']}: {result.solution.message}; {s['outer_iterations']} iterations, residual {s['residual']:.1e}")
-    print(f"method {s['method']}, normal problem by {s['normal_backend']}, tangential by {s['tangential_backend']}")
+    native = s["normal_backend"] == s["tangential_backend"] == NATIVE
+    by = f", normal problem by {s['normal_backend']}, tangential by {s['tangential_backend']}"
+    print(f"method {s['method']}" + ("" if native else by))
     approach = "none (no plate)" if s["approach"] is None else f"{s['approach']:.6g} mm"
     print(f"normal force {s['normal_force']:.6g} N, approach {approach}, largest pressure {s['max_pressure']:.6g} MPa")
     print(f"contact half-width {s['contact_half_width']:.6g} mm, stick half-width {s['stick_half_width']:.6g} mm")

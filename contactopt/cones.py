@@ -65,3 +65,27 @@ def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.n
         shrink = np.divide(radius, length, out=np.ones_like(length), where=outside)
         D[outside] = shrink[outside, None, None] * (D - unit[:, :, None] * unit[:, None, :])[outside]
     return disc(y, radius), D
+
+
+def coulomb_map(y: np.ndarray, mu: np.ndarray, bilateral: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """The Alart-Curnier map of y = r - rho u (k, dim) and its generalised derivative (k, dim, dim).
+
+    Normal part max(y_n, 0), tangential part projected on the disc of radius mu max(y_n, 0); bilateral contact: y_n and
+    mu |y_n|. Not a projection on a convex set, but r = P(r - rho u) exactly at the solutions of Coulomb's problem.
+    """
+    k, dim = y.shape
+    n, t = split(y)
+    normal, sign = (n, np.sign(n)) if bilateral else (np.maximum(n, 0.0), (n > 0).astype(float))
+    bound, slope = mu * np.abs(normal), mu * sign
+    length = np.linalg.norm(t, axis=1)
+    slip = (length > bound) & (bilateral | (n > 0))
+    P = np.concatenate([normal[:, None], disc(t, bound)], axis=1)
+    D = np.zeros((k, dim, dim))
+    D[bilateral | (n > 0)] = np.eye(dim)
+    unit = t[slip] / length[slip, None]
+    D[slip, 1:, 0] = slope[slip, None] * unit
+    turn = (bound[slip] / length[slip])[:, None, None]
+    D[slip, 1:, 1:] = turn * (np.eye(dim - 1) - unit[:, :, None] * unit[:, None, :])
+    if dim == 2:
+        D[slip, 1, 1] = 0.0
+    return P, D

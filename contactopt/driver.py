@@ -9,32 +9,36 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import BackendError, InputError
-from contactopt.methods import Method, find_method
-from contactopt.problem import InterfaceProblem, Solution, Status, dimensionless, natural_map_residual
+from contactopt.methods import Method, default_method, find_method
+from contactopt.problem import InterfaceProblem, Scales, Solution, Status, dimensionless, natural_map_residual
 from contactopt.scene import check_number
 
 CYCLE = 12  # longest cycle that is looked for
 SAME = 1e-11  # relative distance at which two iterates are the same state
+CONFIRM = 8  # repeated states in a row after which a method is not going anywhere; some change course before that
 
 
 def solve(
     problem: InterfaceProblem,
-    method: str | Method = "alternating",
+    method: str | Method | None = None,
     tol: float = 1e-8,
     *,
     max_iterations: int = 500,
     time_limit: float = np.inf,
     change_tol: float | None = None,
+    start: Solution | None = None,
     progress: Callable[[int, float], None] | None = None,
     **settings: Any,
 ) -> Solution:
     """Solve an interface problem; the answer's status is `solved` only if its certificate is at most `tol`.
 
-    method          a name (see `contactopt list`) with its `settings`, or a method object
+    method          a name (see `contactopt list`) with its `settings`, or a method object; None: `auto`, or `alternating`
+                    if the settings name a backend
     tol             bound on natural_map_residual(problem, reactions, multipliers)
     max_iterations, time_limit [s]   of the method, residual evaluation not counted
     change_tol      the paper's criterion |r_t - r_t previous| / |r_t| <= change_tol (1e-5 there), None: not used. If
                     it is met first the iteration ends, with status `settled` unless the certificate agrees
+    start           a solution of a problem of the same size, to start from instead of cold
     progress        called with (iteration, residual) after each outer iteration
     Raises InputError on arguments that make no sense, an unknown or missing backend, or a load that pulls the bodies
     apart. A backend that fails while solving is a status, with the last iterate.
@@ -43,8 +47,8 @@ def solve(
     check_number("max_iterations", max_iterations, low=0.0)
     if change_tol is not None:
         check_number("change_tol", change_tol, low=0.0)
-    if isinstance(method, str):
-        method = find_method(method, **settings)
+    if method is None or isinstance(method, str):
+        method = find_method(method or default_method(settings), **settings)
     elif settings:
         raise InputError(
             f"settings {', '.join(settings)} belong to a method given by name; set them on the method object."
@@ -52,10 +56,10 @@ def solve(
     _check_equilibrium(problem)
     scaled, scales = dimensionless(problem)
     recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)
-    message, status = "", Status.STALLED
-    steps = method.iterate(scaled)
+    message, status = "", Status.SETTLED
+    steps = method.iterate(scaled, None if start is None else _dimensionless_start(start, problem, scales))
     while True:
-        start = time.perf_counter()
+        begin = time.perf_counter()
         try:
             iterate = next(steps, None)
         except BackendError as error:
@@ -63,7 +67,7 @@ def solve(
             break
         if iterate is None:
             break
-        ended = recorder.record(*iterate, time.perf_counter() - start)
+        ended = recorder.record(*iterate, time.perf_counter() - begin)
         if ended is not None:
             status = ended
             break
@@ -82,6 +86,15 @@ def solve(
     )
 
 
+def _dimensionless_start(start: Solution, problem: InterfaceProblem, scales: Scales) -> tuple[np.ndarray, np.ndarray]:
+    if start.reactions.shape != problem.q.shape or start.multipliers.shape != problem.s.shape:
+        raise InputError(
+            f"start has reactions {start.reactions.shape} and {len(start.multipliers)} multipliers; this problem needs "
+            f"{problem.q.shape} and {len(problem.s)}."
+        )
+    return scales.to_dimensionless(start.reactions, start.multipliers)
+
+
 class _Recorder:
     """Certificate, history and stopping rule of one solve; its clock counts the method's own time."""
 
@@ -93,6 +106,7 @@ class _Recorder:
         self.history: list[dict[str, float]] = []
         self.recent: list[np.ndarray] = [self.reactions]
         self.clock = 0.0
+        self.repeated = 0
 
     def record(self, r: np.ndarray, lam: np.ndarray, seconds: float) -> Status | None:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
@@ -109,7 +123,8 @@ class _Recorder:
             return Status.SOLVED
         if self.change_tol is not None and len(self.history) > 1 and change <= self.change_tol:
             return Status.SETTLED
-        if repeats and len(self.history) > 1:
+        self.repeated = self.repeated + 1 if repeats else 0
+        if self.repeated >= CONFIRM:
             return Status.STALLED if repeats[0] == 1 else Status.CYCLING
         if len(self.history) >= self.max_iterations:
             return Status.ITERATION_LIMIT

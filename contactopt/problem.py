@@ -28,7 +28,7 @@ class Status(Enum):
     """How a solve ended: a word for tables and a sentence for people."""
 
     SOLVED = "solved", "the natural-map residual is at most the tolerance"
-    SETTLED = "settled", "the change per iteration met its own criterion, but the certificate is above the tolerance"
+    SETTLED = "settled", "the method ended by its own criterion, but the certificate is above the tolerance"
     ITERATION_LIMIT = "iteration_limit", "the iterations ran out with the certificate above the tolerance"
     TIME_LIMIT = "time_limit", "the time ran out with the certificate above the tolerance"
     CYCLING = "cycling", "the iteration came back to an earlier state, so it cannot converge; try relaxation"

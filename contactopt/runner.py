@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.methods import find_method
+from contactopt.methods import default_method, find_method
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.recover import Fields, recover
 from contactopt.reduction import Reduction
@@ -56,7 +56,7 @@ def run(
     scene: str | Scene,
     out: str | Path | None = None,
     *,
-    method: str = "alternating",
+    method: str | None = None,
     normal: str | None = None,
     tangential: str | None = None,
     tol: float = 1e-8,
@@ -67,7 +67,7 @@ def run(
     """Solve a scene end to end, and write its figures and files into the directory `out` if one is given.
 
     scene     a name (see contactopt.scenes.SCENES), `changes` to its arguments; or a Scene, `changes` to its fields
-    method, normal, tangential   names; None is the method's default backend
+    method, normal, tangential   names; by default `auto`, or `alternating` if a backend is named
     elements  across the contact half-width;  tol  bound on the natural-map residual;  note  receives progress messages
     Raises InputError with a sentence that says what to do; nothing is left half-written.
     """
@@ -75,8 +75,9 @@ def run(
     if elements is not None:
         changes["elements"] = elements
     scene = make_scene(scene, **changes) if isinstance(scene, str) else _changed(scene, changes)
-    given = {"normal": normal, "tangential": tangential}
-    chosen = find_method(method, **{k: v for k, v in given.items() if v is not None})
+    given = {k: v for k, v in (("normal", normal), ("tangential", tangential)) if v is not None}
+    method = method or default_method(given)
+    chosen = find_method(method, **given)
     backends = chosen.backends(scene.dim)  # refused here, before any work, if one of them cannot be used
     target = None if out is None else _writable(Path(out))
     reduction, solution, zones = solve_zone(scene, note=note, method=chosen, tol=tol)
@@ -101,7 +102,12 @@ def _changed(scene: Scene, changes: dict[str, Any]) -> Scene:
 
 
 def _summary(
-    scene: Scene, reduction: Reduction, solution: Solution, method: str, backends: tuple[str, str], zones: list[float]
+    scene: Scene,
+    reduction: Reduction,
+    solution: Solution,
+    method: str,
+    backends: tuple[str, str],
+    zones: list[float],
 ) -> dict[str, Any]:
     problem, r = reduction.problem, solution.reactions
     width = zones[-1] if zones else contact_half_width(scene, problem, r)

@@ -9,11 +9,11 @@ import contactopt
 
 ROOT = Path(contactopt.__file__).parent
 ORDER = [
-    "errors", "scene", "analytic", "mesh", "scenes", "body", "dissection", "cones", "problem", "crossover", "models",
-    "backends", "backends.qp", "backends.conic", "methods", "methods.alternating", "driver", "reduction", "zone",
-    "recover", "plots", "runner", "cli", "__main__",
+    "errors", "scene", "analytic", "mesh", "scenes", "body", "dissection", "cones", "problem", "semismooth", "models",
+    "backends", "backends.qp", "backends.conic", "methods", "methods.alternating", "methods.newton", "methods.proximal", "methods.auto", "driver", "reduction", "zone",
+    "recover", "fclib", "plots", "runner", "cli", "__main__",
 ]  # fmt: skip
-NO_FINITE_ELEMENTS = ("cones", "problem", "crossover", "models", "backends", "methods", "driver")
+NO_FINITE_ELEMENTS = ("cones", "problem", "semismooth", "models", "backends", "methods", "driver")
 
 
 def imports(path: Path) -> set[str]:

@@ -17,7 +17,7 @@ def test_every_qp_backend_gives_the_same_certified_answer(name, punch):
         assert name not in REQUIRED_QP, f"install the test extra: {name} is missing"
         pytest.skip(f"{name} is not installed")
     best = solve(punch, tol=1e-12, max_iterations=100)
-    solution = solve(punch, normal=name, tangential=name, tol=1e-9)
+    solution = solve(punch, method="alternating", normal=name, tangential=name, tol=1e-9)
     assert solution.solved
     assert solution.multipliers[0] == pytest.approx(best.multipliers[0], rel=1e-6)
     assert solution.reactions[:, 0].max() == pytest.approx(best.reactions[:, 0].max(), rel=1e-6)
@@ -29,7 +29,7 @@ def test_every_conic_backend_gives_the_same_certified_answer(name, cube):
         assert name not in REQUIRED_CONIC, f"install the test extra: {name} is missing"
         pytest.skip(f"{name} is not installed")
     best = solve(cube, tol=1e-11)
-    solution = solve(cube, tangential=name, tol=1e-9)
+    solution = solve(cube, method="alternating", tangential=name, tol=1e-9)
     assert solution.solved
     assert np.allclose(solution.reactions, best.reactions, atol=1e-6 * np.abs(best.reactions).max())
 
@@ -40,7 +40,7 @@ def test_unknown_and_missing_backends_say_what_to_do(monkeypatch):
     with pytest.raises(InputError, match="pip install nowhere-solver"):
         find("nowhere", {"nowhere": Backend("nowhere", "qp", "nowhere_solver", "nowhere-solver")})
     with pytest.raises(InputError, match="unknown qp backend"):
-        solve(one_contact((0.8, 1.0), 0.1), normal="simplex")
+        solve(one_contact((0.8, 1.0), 0.1), method="alternating", normal="simplex")
 
 
 def fake(monkeypatch, answer):
@@ -66,7 +66,7 @@ def fake(monkeypatch, answer):
 )
 def test_a_backend_that_fails_is_a_status_that_names_it(monkeypatch, punch, answer, words):
     fake(monkeypatch, answer)
-    solution = solve(punch)
+    solution = solve(punch, method="alternating")
     assert solution.status.label == "backend_failed" and not solution.solved
     assert __import__("re").search(words, solution.message)
     assert solution.reactions.shape == punch.q.shape and np.all(np.isfinite(solution.reactions))
@@ -76,7 +76,7 @@ def test_a_backend_that_lies_is_not_believed(monkeypatch, punch):
     """Whatever it claims, the residual of what comes back is recomputed from the problem."""
     fake(monkeypatch, lambda p: np.full(len(p.q), 5.0))
     monkeypatch.setattr("contactopt.methods.alternating.crossover", lambda Q, c, V, s, P, r, lam: (r, lam))
-    solution = solve(punch, max_iterations=3)
+    solution = solve(punch, "alternating", max_iterations=3)
     assert not solution.solved
     assert solution.residual == natural_map_residual(punch, solution.reactions, solution.multipliers) > 1e-3
 

@@ -107,9 +107,15 @@ def test_list(capsys):
     "arguments,words",
     [
         (["nowhere"], "unknown scene 'nowhere'; choose from punch-2d, punch-3d, sphere"),
-        (["punch-2d", "--normal", "simplex"], "unknown qp backend 'simplex'; choose from clarabel"),
-        (["punch-3d", "--tangential", "proxqp"], "unknown conic backend 'proxqp'; choose from clarabel"),
-        (["punch-2d", "--method", "magic"], "unknown method 'magic'; choose from alternating"),
+        (
+            ["punch-2d", "--normal", "simplex"],
+            "unknown qp backend 'simplex'; choose from clarabel",
+        ),
+        (
+            ["punch-3d", "--tangential", "proxqp"],
+            "unknown conic backend 'proxqp'; choose from clarabel",
+        ),
+        (["punch-2d", "--method", "magic"], "unknown method 'magic'; choose from auto"),
         (["punch-2d", "--mu", "-1"], "mu must be a finite number at least 0"),
         (["punch-2d", "--mu", "nan"], "mu must be a finite number"),
         (["punch-2d", "--elements", "0"], "elements must be a whole number"),

@@ -1,13 +1,14 @@
 """Methods: one file each, one line here. Nothing is imported before it is used.
 
-A method is a frozen dataclass whose fields are its settings. `iterate(problem)` takes a dimensionless
-InterfaceProblem and yields (reactions (k, dim), multipliers (p,)) after each outer iteration; the driver
-(contactopt.solve) owns the clock, the stopping rule, the history and the limits.
+A method is a frozen dataclass whose fields are its settings. `iterate(problem, start)` takes a dimensionless
+InterfaceProblem and yields (reactions (k, dim), multipliers (p,)) after each outer iteration, from a cold start if
+`start` is None; the driver (contactopt.solve) owns the clock, the stopping rule, the history and the limits. A method
+that ends by itself has met its own criterion or cannot go on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from typing import Any, Protocol
 
@@ -16,22 +17,38 @@ import numpy as np
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 
+Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
+
 
 class Method(Protocol):
-    def iterate(self, problem: InterfaceProblem) -> Iterator[tuple[np.ndarray, np.ndarray]]: ...
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]: ...
 
     def backends(self, dim: int) -> tuple[str, str]:
-        """Names of the normal and tangential backend in `dim` dimensions; InputError if one cannot be used."""
+        """Names of its normal and tangential backend in `dim` dimensions, NATIVE where it needs none.
+
+        Raises InputError if one cannot be used.
+        """
 
 
 # name -> (module, class, what it is)
 METHODS = {
+    "auto": ("contactopt.methods.auto", "Auto", "Newton, then proximal where Newton fails; the default"),
+    "newton": ("contactopt.methods.newton", "Newton", "semismooth Newton on the Alart-Curnier equations"),
+    "proximal": ("contactopt.methods.proximal", "Proximal", "proximal-point loop around Newton"),
     "alternating": (
         "contactopt.methods.alternating",
         "Alternating",
         "normal QP and tangential QP or SOCP in turn (paper, 5.1)",
     ),
 }
+
+
+NATIVE = "native"  # in place of a backend's name: our own linear algebra
+
+
+def default_method(settings: Mapping[str, Any]) -> str:
+    """`auto`, or `alternating` where the settings name a backend."""
+    return "alternating" if settings.get("normal") or settings.get("tangential") else "auto"
 
 
 def find_method(name: str, **settings: Any) -> Method:

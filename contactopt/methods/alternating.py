@@ -20,10 +20,11 @@ from contactopt.backends import CONIC, QP, find
 from contactopt.backends.conic import DiscSOCP
 from contactopt.backends.qp import BoxQP
 from contactopt.cones import disc_derivative, half_line_derivative
-from contactopt.crossover import crossover
 from contactopt.errors import InputError
+from contactopt.methods import Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.scene import check_number
+from contactopt.semismooth import crossover
 
 
 @dataclass(frozen=True)
@@ -44,15 +45,15 @@ class Alternating:
         tangential = self.tangential or ("proxqp" if dim == 2 else "clarabel")
         return find(self.normal, QP).name, find(tangential, QP if dim == 2 else CONIC).name
 
-    def iterate(self, problem: InterfaceProblem) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        k, p = problem.contacts, len(problem.s)
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)  # columns with normal entries
         backends = self.backends(problem.dim)
         normal, tangential = (
             NormalProblem(backends[0], problem, pushes),
             TangentialProblem(backends[1], problem, ~pushes),
         )
-        r_n, r_t, multipliers = np.zeros(k), np.zeros((k, problem.dim - 1)), np.zeros(p)
+        r, multipliers = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
+        r_n, r_t, multipliers = r[:, 0], r[:, 1:], multipliers.copy()
         while True:
             r_n, multipliers[pushes] = normal.solve(r_t, r_n, multipliers)
             new, multipliers[~pushes] = tangential.solve(r_n, r_t, multipliers)

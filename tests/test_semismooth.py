@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from contactopt.cones import disc_derivative, half_line_derivative
-from contactopt.crossover import crossover
+from contactopt.semismooth import crossover
 
 
 def spd(n, seed=0):
