@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from contactopt.reduction import reduce, reduce_bodies
     from contactopt.runner import Result, run
     from contactopt.scene import BodyForce, Material, Part, Plate, Rigid, Scene, Support, Traction
+    from contactopt.warm import transfer
 
 _HOMES = {
     "analytic": ("Reference",),
@@ -32,9 +33,10 @@ _HOMES = {
     "recover": ("Fields",),
     "reduction": ("reduce", "reduce_bodies"),
     "runner": ("Result", "run"),
+    "warm": ("transfer",),
     "scene": ("BodyForce", "Material", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
 }
-_MODULES = ("plots", "scenes")
+_MODULES = ("fclib", "plots", "scenes")
 __all__ = sorted([*(name for names in _HOMES.values() for name in names), *_MODULES])
 
 

@@ -89,3 +89,27 @@ def coulomb_map(y: np.ndarray, mu: np.ndarray, bilateral: bool = False) -> tuple
     if dim == 2:
         D[slip, 1, 1] = 0.0
     return P, D
+
+
+def coulomb_cone_derivative(y: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Projection of y (k, dim) on Coulomb's cones, as coulomb_cone, and its generalised derivative (k, dim, dim).
+
+    Identity inside the cone and zero in its polar. Between them the nearest point is h (1, mu unit) with
+    h = (y_n + mu |y_t|) / (1 + mu^2): the derivative projects on that ray and shrinks what is tangent to the disc.
+    """
+    k, dim = y.shape
+    n, t = split(y)
+    length = np.linalg.norm(t, axis=1)
+    polar = mu * length <= -n
+    surface = ~polar & ((length > mu * n) | (mu == 0))
+    D = np.zeros((k, dim, dim))
+    D[~polar & ~surface] = np.eye(dim)
+    m, size = mu[surface], length[surface]
+    unit = np.divide(t[surface], size[:, None], out=np.zeros((len(m), dim - 1)), where=size[:, None] > 0)
+    height = (n[surface] + m * size) / (1 + m**2)
+    ray = np.concatenate([np.ones((len(m), 1)), m[:, None] * unit], axis=1)
+    D[surface] = ray[:, :, None] * ray[:, None, :] / (1 + m**2)[:, None, None]
+    if dim == 3:
+        turn = np.divide(m * height, size, out=np.zeros(len(m)), where=size > 0)[:, None, None]
+        D[surface, 1:, 1:] += turn * (np.eye(2) - unit[:, :, None] * unit[:, None, :])
+    return coulomb_cone(y, mu), D

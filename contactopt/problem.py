@@ -141,6 +141,9 @@ class Solution:
         return self.status is Status.SOLVED
 
 
+NOISE = 1e-13  # relative size of what rounding leaves of a zero
+
+
 @dataclass(frozen=True)
 class Scales:
     """Units in which a problem is dimensionless: force, length, and one length per multiplier."""
@@ -173,7 +176,8 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     length = force * compliance
     columns = np.where(columns > 0, columns, 1.0)
     Q = problem.Q / compliance
-    rigid = ~(np.any(Q, axis=1) | np.any(problem.V, axis=1) | (problem.q.ravel() != 0))
+    moves = [np.abs(Q).max(axis=1), *np.abs(problem.V.T), np.abs(problem.q.ravel())]
+    rigid = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
     Q[rigid, rigid] = 1.0
     scaled = replace(
         problem,

@@ -89,7 +89,9 @@ class Equations:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", la.LinAlgWarning)  # a bad step is seen by its residual
-                x = la.solve(matrix, right, overwrite_a=True, overwrite_b=True, check_finite=False)
+                # The transpose of a C array is what LAPACK factorises in place.
+                factors = la.lu_factor(matrix.T, overwrite_a=True, check_finite=False)
+                x = la.lu_solve(factors, right, trans=1, check_finite=False)
         except (la.LinAlgError, ValueError):
             return None
         if not np.all(np.isfinite(x)):

@@ -14,6 +14,7 @@ from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.reduction import Reduction, reduce_bodies
 from contactopt.scene import Scene
+from contactopt.warm import transfer
 
 FIT = 4  # nodes next to the edge through which p^2 is extrapolated
 AGREE = 0.05  # two zones agree when they differ by less than this fraction of an element
@@ -76,17 +77,21 @@ def solve_zone(
 
     Each round solves on meshes with a node at the present zone's edge and reads the new edge from the reactions; two
     zones agree when they differ by a twentieth of an element. Returns the last reduction and solution with the zones
-    tried, the last of them the result, none if there is no loop; `seconds` are summed over the rounds. settings go to
+    tried, the last of them the result, none if there is no loop; `seconds` are summed over the rounds, each of which starts
+    from the one before. settings go to
     solve().
     """
     elements = scene.elements if elements is None else elements
     seconds: Counter[str] = Counter()
+    previous: tuple[InterfaceProblem, Solution] | None = None
     zones = [scene.zone] if scene.zone is not None else []
     while True:
         note(f"reducing {scene.name}" + (f", zone {zones[-1]:.6g}" if zones else ""))
         reduction = reduce_bodies(scene, elements, zones[-1] if zones else None)
         note(f"solving {reduction.problem.contacts} contacts")
-        solution = solve(reduction.problem, **settings)
+        start = None if previous is None else transfer(*previous, reduction.problem)
+        solution = solve(reduction.problem, start=start, **settings)
+        previous = reduction.problem, solution
         seconds.update(reduction.seconds)
         seconds.update(solution.seconds)
         solution = replace(solution, seconds=dict(seconds))

@@ -9,11 +9,11 @@ import contactopt
 
 ROOT = Path(contactopt.__file__).parent
 ORDER = [
-    "errors", "scene", "analytic", "mesh", "scenes", "body", "dissection", "cones", "problem", "semismooth", "models",
-    "backends", "backends.qp", "backends.conic", "methods", "methods.alternating", "methods.newton", "methods.proximal", "methods.auto", "driver", "reduction", "zone",
+    "errors", "scene", "analytic", "mesh", "scenes", "body", "dissection", "cones", "problem", "semismooth", "bonded", "models",
+    "backends", "backends.qp", "backends.conic", "backends.direct", "methods", "methods.alternating", "methods.tresca", "methods.cone", "methods.newton", "methods.proximal", "methods.auto", "driver", "warm", "reduction", "zone",
     "recover", "fclib", "plots", "runner", "cli", "__main__",
 ]  # fmt: skip
-NO_FINITE_ELEMENTS = ("cones", "problem", "semismooth", "models", "backends", "methods", "driver")
+NO_FINITE_ELEMENTS = ("cones", "problem", "semismooth", "bonded", "models", "backends", "methods", "driver")
 
 
 def imports(path: Path) -> set[str]:

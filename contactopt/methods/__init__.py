@@ -35,6 +35,9 @@ METHODS = {
     "auto": ("contactopt.methods.auto", "Auto", "Newton, then proximal where Newton fails; the default"),
     "newton": ("contactopt.methods.newton", "Newton", "semismooth Newton on the Alart-Curnier equations"),
     "proximal": ("contactopt.methods.proximal", "Proximal", "proximal-point loop around Newton"),
+    "tresca": ("contactopt.methods.tresca", "Tresca", "successive convex problems with given friction bounds"),
+    "acary_cadoux": ("contactopt.methods.cone", "AcaryCadoux", "fixed point on the SOCP over Coulomb's cones"),
+    "relaxation": ("contactopt.methods.cone", "Relaxation", "one SOCP: associated friction, another law (dilatancy)"),
     "alternating": (
         "contactopt.methods.alternating",
         "Alternating",

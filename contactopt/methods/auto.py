@@ -1,23 +1,33 @@
-"""The default: Newton's method while it gets anywhere, then the proximal loop from the best point it reached.
+"""The default, without a number to choose: Newton's method, then the proximal loop, then the loop from other starts.
 
-No number to choose. Newton's method is left when it fails to solve its linear system, when its residual has not improved
-for PATIENCE steps, or after LIMIT steps. Cost where Newton converges (elastic bodies): 2 to 10 dense linear systems.
+1. Newton's method from the bonded solution (or no force at all) while its residual falls: elastic bodies end here, after
+   1 to 11 steps of one dense linear system each.
+2. The proximal loop from the best point reached: rank-deficient Q (rigid bodies, redundant contacts), cycles.
+3. When ROUND outer iterations have not halved the residual, the loop starts again from contact forces drawn at random
+   (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong friction may have solutions that
+   repel the loop and others that attract it.
+It ends where the driver's certificate or limits say so. There is no proof that it finds a solution: Coulomb's problem
+may have none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from contactopt.cones import coulomb_cone
 from contactopt.methods import NATIVE, Iterate
-from contactopt.methods.newton import Newton, bonded, coulomb_equations
+from contactopt.methods.newton import Newton, cold_start, coulomb_equations
 from contactopt.methods.proximal import Proximal
 from contactopt.problem import InterfaceProblem
 
-LIMIT = 25
-PATIENCE = 6
+LIMIT = 25  # Newton steps
+PATIENCE = 6  # of them without progress
+PROGRESS = 0.9  # a residual that falls by less is no progress
+ROUND = 20  # outer iterations of the proximal loop that must halve the residual
+LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 
 
 @dataclass(frozen=True)
@@ -28,12 +38,42 @@ class Auto:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
+        reached = yield from self._newton(problem, start)
+        random = np.random.default_rng(0)
+        while True:
+            last = yield from self._proximal(problem, reached)
+            r = random.normal(size=problem.q.shape)
+            r[:, 0] = np.abs(r[:, 0])
+            r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
+            reached = coulomb_cone(r, problem.mu), last[1]
+
+    @staticmethod
+    def _newton(problem: InterfaceProblem, start: Iterate | None) -> Generator[Iterate, None, Iterate]:
+        """Newton's iterates; returns the best."""
         equations = coulomb_equations(problem)
         best, reached, since = np.inf, start, 0
         for count, point in enumerate(Newton().iterate(problem, start)):
             yield point
             residual = equations.evaluate(*point)[0]
-            best, reached, since = (residual, point, 0) if residual < best else (best, reached, since + 1)
+            since = 0 if residual < PROGRESS * best else since + 1
+            if residual < best:
+                best, reached = residual, point
             if since >= PATIENCE or count >= LIMIT:
                 break
-        yield from Proximal().iterate(problem, reached if best < np.inf else bonded(problem))
+        return reached or cold_start(problem)
+
+    @staticmethod
+    def _proximal(problem: InterfaceProblem, start: Iterate) -> Generator[Iterate, None, Iterate]:
+        """Iterates of the proximal loop while each ROUND of them halves the residual; returns the last."""
+        equations = coulomb_equations(problem)
+        best, target, point = np.inf, np.inf, start
+        for count, point in enumerate(Proximal().iterate(problem, start)):
+            yield point
+            best = min(best, equations.evaluate(*point)[0])
+            if count % ROUND == ROUND - 1:
+                if best > target:
+                    break
+                target = best / 2
+        if point is start:  # not a single subproblem could be solved from there
+            yield point
+        return point

@@ -15,11 +15,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg as la
 
+from contactopt.bonded import Bonded
 from contactopt.cones import coulomb_map
 from contactopt.methods import NATIVE, Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.semismooth import Equations
+
+LOOSE = 0.5  # share of contacts that do not stick, up to which the bonded factorisation is cheaper than a new one
 
 
 @dataclass(frozen=True)
@@ -31,16 +35,15 @@ class Newton:
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         equations = coulomb_equations(problem)
-        r, multipliers = bonded(problem) if start is None else start
-        if start is None:
-            yield r, multipliers
+        factor = bonded_factor(problem)
+        r, multipliers = cold_start(problem, factor) if start is None else start
         while True:
             _, error, balance, D = equations.evaluate(r, multipliers)
-            step = equations.step(error, balance, D)
+            yield r + error, multipliers  # P(y): at the solution equal to r, and within the bounds to the last digit
+            step = newton_step(equations, factor, error, balance, D)
             if step is None:
                 return
             r, multipliers = r + step[0], multipliers + step[1]
-            yield r, multipliers
 
 
 def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = None, weight: float = 0.0) -> Equations:
@@ -58,13 +61,41 @@ def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = Non
     )
 
 
-def bonded(problem: InterfaceProblem) -> Iterate:
-    """Cold start: all contacts glued if a plate presses the bodies together, else no force at all."""
-    r, multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
+def bonded_factor(problem: InterfaceProblem) -> Bonded | None:
+    """The factorised bonded system where it pays: elastic bodies pressed together by a plate, Q of full rank."""
+    try:
+        return Bonded(problem.Q, problem.V) if len(problem.s) else None
+    except la.LinAlgError:
+        return None
+
+
+def newton_step(
+    equations: Equations, factor: Bonded | None, error: np.ndarray, balance: np.ndarray, D: np.ndarray
+) -> Iterate | None:
+    """One step, through the bonded system while few contacts are open or slip."""
+    loose = np.any(np.eye(D.shape[1]) != D, axis=(1, 2))
+    if factor is not None and loose.sum() <= LOOSE * len(loose):
+        try:
+            return factor.step(equations.rho, error, balance, D)
+        except (la.LinAlgError, np.linalg.LinAlgError):
+            pass
+    return equations.step(error, balance, D)
+
+
+def cold_start(problem: InterfaceProblem, factor: Bonded | None = None) -> Iterate:
+    """All contacts glued if a plate presses the bodies together, else no force at all."""
+    zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
     if len(problem.s) == 0:
-        return r, multipliers
-    k, dim = problem.q.shape
-    glue = Equations(problem.Q, problem.q, problem.V, problem.s, lambda y: (y, np.tile(np.eye(dim), (k, 1, 1))))
-    _, error, balance, D = glue.evaluate(r, multipliers)
-    step = glue.step(error, balance, D, ridge=1e-8)
-    return step if step is not None else (r, multipliers)
+        return zero
+    if factor is not None:
+        r, multipliers = factor.solve(-problem.q.ravel(), problem.s)
+        return r.reshape(problem.q.shape), multipliers
+    glue = Equations(
+        problem.Q,
+        problem.q,
+        problem.V,
+        problem.s,
+        lambda y: (y, np.broadcast_to(np.eye(y.shape[1]), (*y.shape, y.shape[1]))),
+    )
+    _, error, balance, D = glue.evaluate(*zero)
+    return glue.step(error, balance, D, ridge=1e-8) or zero

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.methods import NATIVE, Iterate
-from contactopt.methods.newton import bonded, coulomb_equations
+from contactopt.methods.newton import cold_start, coulomb_equations
 from contactopt.problem import InterfaceProblem
 
 INNER = 15  # Newton steps in one proximal subproblem
@@ -36,7 +36,7 @@ class Proximal:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        r, multipliers = start or bonded(problem)
+        r, multipliers = start or cold_start(problem)
         alpha = self.alpha
         while alpha < LARGEST:
             new, solved = proximal_step(problem, r, multipliers, alpha)

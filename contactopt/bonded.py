@@ -1,0 +1,82 @@
+"""Newton steps at the price of one factorisation: most contacts of an elastic interface stick.
+
+If every contact stuck, each Newton step would solve the same bonded system B = [[Q, V], [V', 0]]. With z = Q dr + V
+dlambda the change of displacement, known where a contact sticks, a step has unknowns only at the other contacts N:
+
+    dr = G z + h,   G = (B^-1)_rr,   ((I - D) G_NN + D rho) z_N = error_N - (I - D) h_N.
+
+One Cholesky factorisation of Q (n^3/3) serves all steps; a contact that leaves the sticking state costs `dim` columns of G
+once, 2 n^2 operations each. The bonded solution, the cold start of Newton's method, comes with it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as la
+
+SOFTEST = 1e-7  # least diagonal entry of the factor, over the largest: below, Q is too near to singular for this
+
+
+class Bonded:
+    """The factorised bonded system of a symmetric positive definite Q (n, n) with V (n, p)."""
+
+    def __init__(self, Q: np.ndarray, V: np.ndarray):
+        """Raises LinAlgError if Q is not symmetric or not safely positive definite."""
+        n = len(Q)
+        if np.abs(Q - Q.T).max(initial=0.0) > 1e-12 * np.abs(Q).max(initial=0.0):
+            raise la.LinAlgError("Q is not symmetric")
+        self.factor = la.cho_factor(Q, lower=True, check_finite=False)
+        diagonal = np.diag(self.factor[0])
+        if diagonal.min() < SOFTEST * diagonal.max():
+            raise la.LinAlgError("Q is nearly singular")
+        self.V = V
+        self.X = la.cho_solve(self.factor, V, check_finite=False) if V.shape[1] else V
+        self.K = V.T @ self.X  # stiffness that the plates feel
+        self.columns = np.zeros((n, 0))
+        self.place = np.full(n, -1)  # unknown -> its column of G, -1 if not there yet
+
+    def solve(self, z: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """dr, dlambda with Q dr + V dlambda = z (n,) or (n, j) and V' dr = -balance (p,) or (p, j)."""
+        dr = la.cho_solve(self.factor, z, check_finite=False)
+        if self.V.shape[1] == 0:
+            return dr, np.zeros_like(balance)
+        multipliers = np.linalg.solve(self.K, self.V.T @ dr + balance)
+        return dr - self.X @ multipliers, multipliers
+
+    def inverse(self, unknowns: np.ndarray) -> np.ndarray:
+        """Columns of G for these unknowns, each computed once."""
+        new = unknowns[self.place[unknowns] < 0]
+        if len(new):
+            unit = np.zeros((len(self.V), len(new)))
+            unit[new, np.arange(len(new))] = 1.0
+            self.place[new] = self.columns.shape[1] + np.arange(len(new))
+            solved = self.solve(unit, np.zeros((self.V.shape[1], len(new))))[0]
+            self.columns = np.concatenate([self.columns, solved], axis=1)
+        return self.columns[:, self.place[unknowns]]
+
+    def step(
+        self, rho: np.ndarray, error: np.ndarray, balance: np.ndarray, D: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """One Newton step, as Equations.step: dr (k, d), dlambda (p,). Raises LinAlgError if it is singular."""
+        k, d = error.shape
+        loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))
+        N = (loose[:, None] * d + np.arange(d)).ravel()
+        z = (error / rho[:, None]).ravel()
+        z[N] = 0.0
+        dr, multipliers = self.solve(z, balance)
+        if len(N):
+            G = self.inverse(N)
+            keep = np.eye(d) - D[loose]
+
+            def blocks(A: np.ndarray, X: np.ndarray) -> np.ndarray:
+                return (A @ X.reshape(len(loose), d, -1)).reshape(len(N), -1)
+
+            matrix = blocks(keep, G[N])
+            i = np.arange(len(loose))
+            matrix.reshape(len(i), d, len(i), d)[i, :, i, :] += rho[loose, None, None] * D[loose]
+            right = error[loose].ravel() - blocks(keep, dr[N])[:, 0]
+            z_N = la.solve(matrix, right, overwrite_a=True, check_finite=False)
+            dr = dr + G @ z_N
+            if len(balance):
+                multipliers = multipliers + np.linalg.solve(self.K, self.X[N].T @ z_N)
+        return dr.reshape(k, d), multipliers

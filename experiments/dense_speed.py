@@ -1,0 +1,177 @@
+"""How much faster are our methods than generic backends on one dense normal and one dense tangential problem?"""
+
+from __future__ import annotations
+
+import os
+
+# one thread for every library, before numpy is imported
+os.environ.update(
+    dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
+)
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from contactopt.backends import CONIC, QP, Backend
+from contactopt.backends.conic import DiscSOCP
+from contactopt.backends.qp import BoxQP
+from contactopt.cones import disc
+from contactopt.methods.apg import disc_qp
+from contactopt.mprgp import box_qp, mprgp
+from experiments.report import write
+
+REPEATS = 3
+TOL = 1e-8  # certificate that every answer must have
+ACCURACIES = (1e-7, 1e-8, 1e-9)  # asked of a backend, loosest first: the first that is certified counts
+LARGE = ("proxqp", "piqp", "daqp", "osqp", "scs")  # backends that are run at the largest size as well
+DISCS = (16, 32)  # grids
+NODES = (256, 1024, 2048)
+
+
+def half_plane(k: int, half: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
+    """Compliance and linear term of a parabola on a half-plane, contact on the inner part `half` of k nodes.
+
+    The kernel is -log of the distance over the width, pressures constant on elements, diagonal one; the parabola is the
+    one that Hertz's pressure on the inner part makes.
+    """
+    x = -1 + (np.arange(k) + 0.5) * 2 / k
+    d = np.arange(k).astype(float)
+    F = lambda t: t * np.log(t) - t  # noqa: E731
+    kernel = np.log(2 * k) - F(d + 0.5) + np.sign(d - 0.5) * F(np.abs(d - 0.5))
+    Q = kernel[np.abs(np.arange(k)[:, None] - np.arange(k))] / kernel[0]
+    p = np.sqrt(np.maximum(0, 1 - (x / half) ** 2))
+    inner = np.abs(x) < 0.9 * half
+    curvature, top = np.polyfit(x[inner] ** 2, (Q @ (p / p.mean()))[inner], 1)
+    return Q, -(top + curvature * x**2)
+
+
+def half_space(n: int, nu: float = 0.3, load: float = 0.55) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cerruti's kernel on a grid of n^2 points, linear term (k, 2) of a shift with a twist, radii with 12 % zeros."""
+    x = (np.arange(n) + 0.5) * 2 / n - 1
+    X, Y = (a.ravel() for a in np.meshgrid(x, x))
+    dx, dy = X[:, None] - X, Y[:, None] - Y
+    d = np.hypot(dx, dy)
+    np.fill_diagonal(d, 1.0)
+    K = np.empty((n * n, 2, n * n, 2))
+    K[:, 0, :, 0], K[:, 1, :, 1] = (1 - nu) / d + nu * dx**2 / d**3, (1 - nu) / d + nu * dy**2 / d**3
+    K[:, 0, :, 1] = K[:, 1, :, 0] = nu * dx * dy / d**3
+    own = 4 * np.log(1 + np.sqrt(2)) * n / 2 * (1 - nu / 2)  # mean over the point's own square
+    i = np.arange(n * n)
+    K[i, :, i, :] = own * np.eye(2)
+    Q = K.reshape(2 * n * n, -1) / own
+    square = X**2 + Y**2
+    radius = np.sqrt(np.maximum(0, 1 - square / np.quantile(square, 0.88)))
+    full = np.linalg.norm((Q @ np.stack([radius, 0 * radius], axis=1).ravel()).reshape(-1, 2), axis=1).max()
+    return Q, np.stack([-load * full * (1 + 0.3 * Y), 0.15 * full * X], axis=1), radius
+
+
+def residual(Q: np.ndarray, c: np.ndarray, r: np.ndarray, project: Callable[[np.ndarray], np.ndarray]) -> float:
+    """Natural map |r - P(r - rho u)| / max(|r|, rho |c|, rho |u|), rho = |r| / min(max(|u|, |c|), |Q r|)."""
+    image = (Q @ r.ravel()).reshape(r.shape)
+    u = image + c
+    size = max(np.linalg.norm(u), np.linalg.norm(c))
+    rho = np.linalg.norm(r) / min(size, np.linalg.norm(image))
+    return float(np.linalg.norm(r - project(r - rho * u)) / max(np.linalg.norm(r), rho * size))
+
+
+def timed(solve: Callable[[], np.ndarray]) -> tuple[np.ndarray, float]:
+    """The answer and the median wall time of REPEATS cold starts [s]."""
+    times = []
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        answer = solve()
+        times.append(time.perf_counter() - start)
+    return answer, sorted(times)[REPEATS // 2]
+
+
+def at(backend: Backend, accuracy: float) -> Backend:
+    """A backend with its tight settings at another accuracy."""
+    settings = {k: accuracy if isinstance(v, float) and 0 < v < 1e-6 else v for k, v in backend.settings.items()}
+    return replace(backend, settings=settings)
+
+
+def best(backend: Backend, run: Callable[[Backend], np.ndarray], check: Callable[[np.ndarray], float]):  # type: ignore[no-untyped-def]
+    """The loosest accuracy whose answer is certified: accuracy, residual, seconds."""
+    for accuracy in ACCURACIES:
+        chosen = at(backend, accuracy)
+        error = check(run(chosen))
+        if error <= TOL or accuracy == ACCURACIES[-1]:
+            answer, seconds = timed(lambda chosen=chosen: run(chosen))
+            return accuracy, check(answer), seconds
+    raise AssertionError
+
+
+def row(name: str, size: int, accuracy: object, error: float, seconds: float, ours: float) -> dict[str, object]:
+    return {
+        "method": name,
+        "unknowns": size,
+        "accuracy asked": accuracy,
+        "certified residual": error,
+        "median seconds": seconds,
+        "times ours": seconds / ours,
+    }
+
+
+def normal(k: int) -> list[dict[str, object]]:
+    Q, c = half_plane(k)
+    low, none = np.zeros(k), np.zeros(0)
+    check = lambda x: residual(Q, c, np.maximum(x, 0), lambda y: np.maximum(y, 0))  # noqa: E731
+    x, ours = timed(lambda: box_qp(Q, c, low, tol=TOL).x)
+    rows = [row("MPRGP, single precision refined", k, TOL, check(x), ours, ours)]
+    x, seconds = timed(lambda: mprgp(Q, c, low, tol=TOL).x)
+    rows.append(row("MPRGP", k, TOL, check(x), seconds, ours))
+    for name in ("proxqp", "piqp", "daqp", "clarabel", "osqp", "scs"):
+        if not QP[name].installed or (k > 1024 and name not in LARGE):
+            continue
+
+        def run(backend: Backend) -> np.ndarray:
+            return BoxQP(backend, Q, np.zeros((0, k))).solve(c, none, low, np.full(k, np.inf))[0]
+
+        rows.append(row(name, k, *best(QP[name], run, check), ours))
+        print(rows[-1], flush=True)
+    return rows
+
+
+def tangential(n: int) -> list[dict[str, object]]:
+    Q, c, radius = half_space(n)
+    check = lambda t: residual(Q, c, disc(t.reshape(-1, 2), radius), lambda y: disc(y, radius))  # noqa: E731
+    t, ours = timed(lambda: disc_qp(Q, c, radius, tol=0.1 * TOL)[0])
+    slip = (np.linalg.norm(t, axis=1) >= radius * (1 - 1e-7)) & (radius > 0)
+    print(f"{n * n} discs: {np.mean(radius == 0):.0%} without radius, {slip.mean():.0%} slip")
+    rows = [row("accelerated gradients, refined", 2 * n * n, 0.1 * TOL, check(t), ours, ours)]
+
+    def run(backend: Backend) -> np.ndarray:
+        bridge = DiscSOCP.using(backend.name, Q, np.zeros((0, len(Q))))
+        return replace(bridge, backend=backend).solve(c.ravel(), np.zeros(0), radius)[0]
+
+    rows.append(row("clarabel through cvxpy", 2 * n * n, *best(CONIC["clarabel"], run, check), ours))
+    return rows
+
+
+TEXT = """Cold start, one BLAS thread, medians of {repeats} runs, every answer brought to a natural-map residual of 1e-8
+where its method can: of the accuracies 1e-7, 1e-8, 1e-9 a backend is asked for the loosest whose answer is certified, and
+the tightest where none is. "times ours" is the ratio to the first row of the same size.
+
+## Normal problem
+Half-plane with logarithmic kernel, Hertz's gap, half the nodes in contact, no balance row; all unknowns dense. Backends that
+are much slower than the others are not run at the largest size.
+
+{normal}
+
+## Tangential problem
+Cerruti's kernel on a square grid, two unknowns per disc, 12 % of the radii zero, under half of the discs slip. The backend's
+time includes cvxpy's compilation; without a balance row.
+
+{tangential}
+"""
+
+if __name__ == "__main__":
+    tables = {
+        "normal": [r for k in NODES for r in normal(k)],
+        "tangential": [r for n in DISCS for r in tangential(n)],
+    }
+    text = TEXT.replace("{repeats}", str(REPEATS))
+    write("dense_speed", "Our methods against generic backends on dense problems", text, tables, {})

@@ -1,0 +1,264 @@
+import cvxpy as cp
+import numpy as np
+import pytest
+import qpsolvers
+from conftest import one_contact
+
+from contactopt import InputError, InterfaceProblem, models
+from contactopt.backends import CONIC, QP
+from contactopt.backends.conic import Conic
+
+PROGRAMS = ("normal", "displacements", "penalised", "bilateral", "tangential", "tresca", "associated", "acary_cadoux")
+
+
+@pytest.fixture(params=["plane", "solid", "no plate"])
+def problem(request) -> InterfaceProblem:
+    """Elastic contacts with every state: a random well-conditioned compliance, gaps, some contacts without friction."""
+    dim, k = (3 if request.param == "solid" else 2), 6
+    rng = np.random.default_rng(3)
+    A = rng.normal(size=(k * dim, k * dim))
+    Q = A @ A.T / (k * dim) + 0.3 * np.eye(k * dim)
+    q = rng.normal(size=(k, dim)) * ([2.5] + [0.7] * (dim - 1))
+    mu = np.array([0.0, 0.2, 0.3, 0.5, 0.8, 1.2])
+    if request.param == "no plate":
+        return InterfaceProblem(Q, q, mu)
+    V = np.zeros((k, dim, 1))
+    V[:, 0] = 1.0
+    return InterfaceProblem(Q, q, mu, V.reshape(-1, 1), [-6.0])
+
+
+def build(name: str, problem: InterfaceProblem):
+    program = getattr(models, name)(problem)
+    given = {"g": 0.2, "r_n": 1.0, "approach": -0.4, "s": 0.3}
+    for key, parameter in program.parameters.items():
+        if key in given:
+            parameter.value = np.full(parameter.shape, given[key])
+    return program
+
+
+def solved(program):
+    program.problem.solve(solver="CLARABEL", **CONIC["clarabel"].settings)
+    assert program.problem.status == cp.OPTIMAL
+    return program
+
+
+def state(problem, r, lam):
+    u = problem.displacements(r, lam)
+    return u[:, 0], u[:, 1:], np.linalg.norm(r[:, 1:], axis=1)
+
+
+def friction_opposes(slip, r_t, bound, tol=1e-4):
+    """r_t = -bound slip / |slip| wherever there is slip, and within the bound everywhere."""
+    size = np.linalg.norm(slip, axis=1)
+    assert np.all(np.linalg.norm(r_t, axis=1) <= bound + tol)
+    assert np.allclose(r_t * size[:, None], -bound[:, None] * slip, atol=tol)
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_every_program_is_convex_by_the_rules_and_compiles_once(name, problem):
+    program = build(name, problem)
+    assert program.problem.is_dcp() and program.problem.is_dcp(dpp=True)
+
+
+@pytest.mark.parametrize("name", [name for name in PROGRAMS if name != "bilateral"])
+def test_multipliers_before_a_solve_are_refused(name, problem):
+    with pytest.raises(InputError, match="solve it before"):
+        assert build(name, problem).multipliers
+
+
+def test_normal_program_gives_signorini(problem):
+    program = solved(models.normal(problem))
+    m, r = program.multipliers, np.zeros(problem.q.shape)
+    r[:, 0] = program.variables["r_n"].value
+    u_n, _, _ = state(problem, r, m["approach"])
+    assert np.allclose(m["gap"], u_n, atol=1e-6)
+    assert r.min() > -1e-7 and u_n.min() > -1e-6 and np.abs(r[:, 0] * u_n).max() < 1e-6
+    assert (u_n > 1e-3).any() and (r[:, 0] > 1e-3).any()
+    assert np.allclose(problem.V.T @ r.ravel() + problem.s, 0, atol=1e-7)
+
+
+def test_given_tangential_forces_enter_the_normal_program(problem):
+    program = models.normal(problem)
+    r = 0.3 * np.random.default_rng(0).normal(size=problem.q.shape)
+    program.parameters["r_t"].value = r[:, 1:].ravel()
+    m = solved(program).multipliers
+    r[:, 0] = program.variables["r_n"].value
+    assert np.allclose(m["gap"], state(problem, r, m["approach"])[0], atol=1e-6)
+
+
+def test_forces_and_displacements_are_dual(problem):
+    forces, gaps = solved(models.normal(problem)), solved(models.displacements(problem))
+    assert forces.problem.value == pytest.approx(-gaps.problem.value, rel=1e-6)
+    assert np.allclose(gaps.multipliers["reaction"], forces.variables["r_n"].value, atol=1e-5)
+    assert np.allclose(gaps.variables["u"].value, forces.multipliers["gap"], atol=1e-5)
+    if len(problem.s):
+        assert np.allclose(gaps.variables["lambda"].value, forces.multipliers["approach"], atol=1e-5)
+
+
+def test_displacements_need_a_compliance_that_can_be_inverted():
+    with pytest.raises(InputError, match="singular"):
+        models.displacements(InterfaceProblem(np.diag([0.0, 1.0]), np.ones((1, 2)), 0.1))
+
+
+def test_penalised_contact_is_a_spring_and_becomes_contact(problem):
+    exact = solved(models.normal(problem)).variables["r_n"].value
+    errors = []
+    for stiffness in (1e2, 1e3):
+        program = solved(models.penalised(problem, stiffness))
+        r = program.variables["r_n"].value
+        gap = program.multipliers["gap"]
+        assert np.allclose(r, stiffness * np.maximum(-gap, 0), atol=1e-3)
+        errors.append(np.abs(r - exact).max())
+    assert errors[1] < 0.2 * errors[0] < 0.1
+
+
+def test_bilateral_program_closes_every_gap(problem):
+    program = solved(models.bilateral(problem))
+    r = np.zeros(problem.q.shape)
+    r[:, 0] = program.variables["r_n"].value
+    assert r[:, 0].min() < -1e-3
+    assert np.allclose(state(problem, r, program.multipliers["approach"])[0], 0, atol=1e-6)
+
+
+def tangential_at(problem, facets=None):
+    program = models.tangential(problem, facets)
+    r_n = np.linspace(0.0, 1.0, problem.contacts)
+    lam = np.full(min(1, len(problem.s)), -0.4)
+    program.parameters["r_n"].value, program.parameters["g"].value = r_n, problem.mu * r_n
+    if len(problem.s):
+        program.parameters["approach"].value = lam
+    solved(program)
+    r_t = program.variables["r_t"].value.reshape(problem.contacts, -1)
+    return program, np.concatenate([r_n[:, None], r_t], axis=1), lam
+
+
+def test_tangential_program_gives_friction_under_given_bounds(problem):
+    program, r, lam = tangential_at(problem)
+    _, u_t, _ = state(problem, r, lam)
+    assert np.allclose(program.multipliers["slip"], u_t, atol=1e-5)
+    friction_opposes(u_t, r[:, 1:], problem.mu * r[:, 0])
+
+
+@pytest.mark.parametrize("problem", ["solid"], indirect=True)
+def test_polygons_converge_to_discs_from_inside(problem):
+    disc, exact, _ = tangential_at(problem)
+    errors, costs = [], []
+    for facets in (4, 8, 16, 32):
+        program, r, lam = tangential_at(problem, facets)
+        assert np.allclose(program.multipliers["slip"], state(problem, r, lam)[1], atol=1e-5)
+        errors.append(np.abs(r - exact).max())
+        costs.append(program.problem.value - disc.problem.value)
+    assert np.all(np.array(costs) > 0)  # inscribed: never a better value than the disc
+    assert costs[3] < 1.2 * costs[2] / 4 and errors[3] < errors[1] / 2 < errors[0] / 3  # of second order
+    with pytest.raises(InputError, match="at least 3 facets"):
+        models.tangential(problem, 2)
+
+
+@pytest.mark.parametrize("problem", ["solid"], indirect=True)
+@pytest.mark.parametrize("name", ["tresca", "associated", "acary_cadoux"])
+def test_pyramids_make_a_qp_with_the_same_names(name, problem):
+    program = getattr(models, name)(problem, facets=12)
+    for key, value in (("g", 0.2), ("s", 0.3)):
+        if key in program.parameters:
+            program.parameters[key].value = np.full(problem.contacts, value)
+    m, r = solved(program).multipliers, program.variables["r"].value
+    u_n, u_t, _ = state(problem, r.reshape(problem.q.shape), m["approach"])
+    assert np.allclose(m["gap"], u_n, atol=1e-5) and np.allclose(m["slip"], u_t, atol=1e-5)
+    assert np.abs(u_t).max() > 0.1
+    x = qpsolvers.solve_problem(models.as_qp(program), "proxqp", **QP["proxqp"].settings).x
+    assert np.allclose(x, r, atol=1e-5)
+
+
+def test_plate_that_is_dragged_belongs_to_the_tangential_program():
+    V = np.kron(np.ones((4, 1)), np.eye(2))
+    problem = InterfaceProblem(np.diag(np.arange(1.0, 9.0)), np.zeros((4, 2)), 0.5, V, [-4.0, 0.9])
+    program, r, lam = tangential_at(problem)
+    lam = np.append(lam, program.multipliers["shift"])
+    u_t = state(problem, r, lam)[1]
+    assert r[:, 1].sum() == pytest.approx(-0.9, abs=1e-7)
+    assert np.allclose(program.multipliers["slip"], u_t, atol=1e-5) and np.abs(u_t).max() > 0.1
+    friction_opposes(u_t, r[:, 1:], 0.5 * r[:, 0])
+
+
+@pytest.mark.parametrize("bilateral", [False, True])
+def test_tresca_program_gives_both_laws_at_once(problem, bilateral):
+    problem = InterfaceProblem(problem.Q, problem.q, problem.mu, problem.V, problem.s, bilateral=bilateral)
+    program = models.tresca(problem)
+    g = 0.2 * np.arange(problem.contacts)
+    program.parameters["g"].value = g
+    m = solved(program).multipliers
+    r = program.variables["r"].value.reshape(problem.q.shape)
+    u_n, u_t, _ = state(problem, r, m["approach"])
+    assert np.allclose(m["gap"], u_n, atol=1e-5) and np.allclose(m["slip"], u_t, atol=1e-5)
+    assert np.abs(r[:, 0] * u_n).max() < 1e-5
+    assert bilateral == bool(r[:, 0].min() < -1e-2)
+    friction_opposes(u_t, r[:, 1:], g)
+
+
+def test_associated_friction_dilates(problem):
+    """Its law: r in the cone, u_n = mu |u_t| where pressed, friction opposite to slip."""
+    program = solved(models.associated(problem))
+    m, r = program.multipliers, program.variables["r"].value.reshape(problem.q.shape)
+    u_n, u_t, _ = state(problem, r, m["approach"])
+    assert np.allclose(m["gap"], u_n, atol=1e-5) and np.allclose(m["slip"], u_t, atol=1e-5)
+    friction_opposes(u_t, r[:, 1:], problem.mu * r[:, 0])
+    opening = problem.mu * np.linalg.norm(u_t, axis=1)
+    pressed = r[:, 0] > 1e-3
+    assert np.all(u_n > opening - 1e-5) and np.allclose(u_n[pressed], opening[pressed], atol=1e-4)
+    assert opening[pressed].max() > 1e-2
+
+
+def test_acary_cadoux_shifts_the_gap(problem):
+    program = models.acary_cadoux(problem)
+    assert solved(program).problem.value == pytest.approx(solved(models.associated(problem)).problem.value, abs=1e-6)
+    s = np.linspace(0, 1, problem.contacts)
+    program.parameters["s"].value = s
+    m, r = solved(program).multipliers, program.variables["r"].value.reshape(problem.q.shape)
+    u_n, u_t, _ = state(problem, r, m["approach"])
+    assert np.allclose(m["gap"], u_n, atol=1e-5) and np.allclose(m["slip"], u_t, atol=1e-5)
+    room = u_n + problem.mu * (s - np.linalg.norm(u_t, axis=1))
+    assert room.min() > -1e-5 and np.abs(room * r[:, 0]).max() < 1e-4
+
+
+def test_cones_of_contact_without_separation_are_refused():
+    problem = InterfaceProblem(np.eye(2), np.zeros((1, 2)), 0.3, bilateral=True)
+    for name in ("associated", "acary_cadoux"):
+        with pytest.raises(InputError, match="without separation"):
+            getattr(models, name)(problem)
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("problem", ["plane", "no plate"], indirect=True)
+def test_exported_qp_has_the_same_answer(name, problem):
+    program = solved(build(name, problem))
+    qp, columns = models.as_qp(program), models.as_conic(program)["columns"]
+    x = qpsolvers.solve_problem(qp, "proxqp", **QP["proxqp"].settings).x
+    for key, variable in program.variables.items():
+        assert np.allclose(x[columns[key]], variable.value, atol=1e-5)
+
+
+@pytest.mark.parametrize("problem", ["solid"], indirect=True)
+def test_exported_conic_data_are_the_program(problem):
+    """The cost of random forces, and on which side of the cones they lie, computed from the arrays."""
+    program = build("acary_cadoux", problem)
+    data = models.as_conic(program)
+    assert data["zero"] == 1 and data["soc"] == [3] * problem.contacts
+    with pytest.raises(InputError, match="no QP"):
+        models.as_qp(program)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        r = rng.normal(size=problem.q.shape) * [1, 0.3, 0.3] + [0.5, 0, 0]
+        x = np.zeros(len(data["q"]))
+        x[data["columns"]["r"]] = r.ravel()
+        cost = r.ravel() @ problem.Q @ r.ravel() / 2 + (problem.q * r).sum() + 0.3 * problem.mu @ r[:, 0]
+        assert x @ (data["P"] @ x) / 2 + data["q"] @ x == pytest.approx(cost)
+        y = (data["b"] - data["A"] @ x)[-3 * problem.contacts :].reshape(-1, 3)
+        inside = np.linalg.norm(y[:, 1:], axis=1) <= y[:, 0]
+        assert np.array_equal(inside, np.linalg.norm(r[:, 1:], axis=1) <= problem.mu * r[:, 0])
+
+
+def test_conic_bridge_solves_again_with_new_parameters():
+    problem = one_contact((0.8, 1.0), 1.0)
+    bridge = Conic.using("clarabel", models.tresca(problem), problem.Q)
+    friction = [abs(bridge.solve(g=np.array([g]))["r"][1]) for g in (0.1, 0.2)]
+    assert friction == pytest.approx([0.1, 0.2], abs=1e-6)

@@ -1,0 +1,211 @@
+"""The default and what it is made of: Newton's method, the proximal loop, warm starts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+from conftest import one_contact
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve, transfer
+from contactopt.bonded import Bonded
+from contactopt.cones import coulomb_map
+from contactopt.methods.auto import Auto
+from contactopt.methods.newton import coulomb_equations
+from contactopt.problem import dimensionless
+from contactopt.scenes import make_scene
+from contactopt.semismooth import Equations
+
+SMALL = {"punch-2d": 16, "punch-3d": 5, "sphere": 12}
+
+
+def rigid_bodies(seed: int, bodies: int = 6, contacts: int = 14, mu: float = 0.7) -> InterfaceProblem:
+    """Random rigid bodies with more contact unknowns than degrees of freedom: Q = H' M^-1 H has a kernel.
+
+    q = H' v comes from velocities, so that a solution exists.
+    """
+    rng = np.random.default_rng(seed)
+    H = np.zeros((3 * contacts, 6 * bodies))
+    for c in range(contacts):
+        frame = la.qr(rng.normal(size=(3, 3)))[0]
+        i, j = rng.choice(bodies, 2, replace=False)
+        for body, sign in ((i, 1.0), (j, -1.0)):
+            arm = rng.normal(size=3)
+            H[3 * c : 3 * c + 3, 6 * body : 6 * body + 3] = sign * frame
+            H[3 * c : 3 * c + 3, 6 * body + 3 : 6 * body + 6] = sign * np.cross(arm, frame)
+    inverse_mass = 10 ** rng.uniform(-1, 1, 6 * bodies)
+    return InterfaceProblem((H * inverse_mass) @ H.T, (H @ rng.normal(size=6 * bodies)).reshape(-1, 3), mu)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("bilateral", [False, True])
+def test_derivative_of_the_coulomb_map_is_the_difference_quotient(dim, bilateral):
+    rng = np.random.default_rng(0)
+    y, mu = rng.normal(size=(60, dim)), rng.uniform(0, 2, 60)
+    _, D = coulomb_map(y, mu, bilateral)
+    for j in range(dim):
+        step = 1e-7 * np.eye(dim)[j]
+        quotient = (coulomb_map(y + step, mu, bilateral)[0] - coulomb_map(y - step, mu, bilateral)[0]) / 2e-7
+        assert np.allclose(D[:, :, j], quotient, atol=1e-6)
+
+
+@pytest.mark.parametrize("p", [0, 1])
+def test_newton_step_solves_the_linearised_equations(p):
+    """Both ways of solving it, against the full system written out."""
+    rng = np.random.default_rng(5)
+    k, d = 7, 3
+    A = rng.normal(size=(k * d, k * d))
+    Q, V = A @ A.T / 10 + np.eye(k * d), rng.normal(size=(k * d, p))
+    rho, mu = rng.uniform(0.5, 2, k), np.full(k, 0.6)
+    equations = Equations(Q, rng.normal(size=(k, d)), V, rng.normal(size=p), lambda y: coulomb_map(y, mu), rho)
+    r, lam = rng.normal(size=(k, d)) + np.eye(d)[0], rng.normal(size=p)
+    _, error, balance, D = equations.evaluate(r, lam)
+    assert {0.0} < {float(np.abs(block).max()) for block in D}  # open and closed contacts both occur
+    big, scale = la.block_diag(*D), np.repeat(rho, d)
+    full = np.block(
+        [
+            [np.eye(k * d) - big @ (np.eye(k * d) - scale[:, None] * Q), big @ (scale[:, None] * V)],
+            [V.T, np.zeros((p, p))],
+        ]
+    )
+    expected = np.linalg.solve(full, np.concatenate([error.ravel(), -balance]))
+    for dr, dlam in (equations.step(error, balance, D, ridge=0.0), Bonded(Q, V).step(rho, error, balance, D)):
+        assert np.allclose(np.concatenate([dr.ravel(), dlam]), expected, atol=1e-9)
+
+
+def test_bonded_system_refuses_what_it_cannot_factorise():
+    for Q in (np.array([[1.0, 0.5], [0.0, 1.0]]), np.diag([1.0, -1.0]), np.diag([1.0, 1e-18])):
+        with pytest.raises(la.LinAlgError):
+            Bonded(Q, np.zeros((2, 0)))
+
+
+@pytest.mark.parametrize("mu", [0, 0.05, 0.2, 0.5, 1, 2, 5, 10])
+@pytest.mark.parametrize("name", SMALL)
+def test_the_scenes_are_certified_at_every_friction_coefficient(name, mu):
+    solution = solve(reduce(make_scene(name, mu=mu, elements=SMALL[name])), tol=1e-10)
+    assert solution.solved and solution.iterations <= 13
+    assert np.all(solution.reactions[:, 0] >= 0)
+
+
+def test_small_problems_on_which_fixed_points_fail():
+    cycling = solve(one_contact((-10.0, 1.0), 1.0), tol=1e-12)
+    assert cycling.solved and cycling.reactions[0] == pytest.approx([6.4, -6.4])
+    three = solve(one_contact((0.8, 1.0), 1.0), tol=1e-12)
+    solutions = ([1.0, 0.8], [0.4, 0.4], [0.0, 0.0])
+    assert three.solved and any(np.allclose(three.reactions[0], s, atol=1e-10) for s in solutions)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_rank_deficient_problems_are_certified(seed):
+    problem = rigid_bodies(seed)
+    assert np.linalg.matrix_rank(problem.Q) < len(problem.Q)
+    for method in ("auto", "proximal"):
+        assert solve(problem, method).solved
+
+
+def test_proximal_finds_what_newton_misses():
+    """Newton's method runs in circles on some of these; the chain of the default does not."""
+    problems = [rigid_bodies(seed, bodies=10, contacts=40) for seed in range(6)]
+    newton = [solve(problem, "newton", max_iterations=50).solved for problem in problems]
+    assert not all(newton) and all(solve(problem).solved for problem in problems)
+
+
+def test_duplicated_contacts_share_the_force():
+    base = reduce(scenes.flat_punch(2, elements=6))
+    twice = np.repeat(np.arange(base.contacts), 2)
+    rows = (2 * twice[:, None] + np.arange(2)).ravel()
+    doubled = InterfaceProblem(base.Q[np.ix_(rows, rows)], base.q[twice], base.mu[twice], base.V[rows], base.s)
+    a, b = solve(base, tol=1e-10), solve(doubled, tol=1e-8)
+    assert b.solved
+    assert np.allclose(b.reactions[::2] + b.reactions[1::2], a.reactions, atol=1e-5)
+
+
+@pytest.mark.parametrize("elements", [8, 32, 128])
+def test_steps_hardly_depend_on_the_mesh(elements):
+    coarse, fine = (reduce(scenes.flat_punch(2, elements=n, mu=0.3)) for n in (elements // 2, elements))
+    cold = solve(fine)
+    warm = solve(fine, start=transfer(coarse, solve(coarse), fine))
+    assert cold.solved and cold.iterations - 1 <= 12
+    assert warm.solved and warm.iterations - 1 <= 4
+
+
+def test_transfer_keeps_the_traction():
+    coarse, fine = (reduce(scenes.flat_punch(3, elements=n)) for n in (3, 5))
+    moved = transfer(coarse, solve(coarse), fine)
+    assert moved.reactions[:, 0].sum() == pytest.approx(100, rel=0.05)
+    assert natural_map_residual(fine, moved.reactions) < 0.2
+    with pytest.raises(InputError, match="same dimension"):
+        transfer(coarse, solve(coarse), reduce(scenes.flat_punch(2, elements=4)))
+
+
+def test_start_of_the_wrong_size_is_refused(punch, cube):
+    with pytest.raises(InputError, match="start has reactions"):
+        solve(punch, start=solve(cube))
+
+
+def test_a_solution_is_its_own_start(punch):
+    solution = solve(punch, tol=1e-10)
+    assert solve(punch, tol=1e-9, start=solution).iterations == 1
+
+
+@pytest.mark.parametrize("method", ["auto", "newton", "proximal", "alternating"])
+def test_contacts_at_rest_open_or_frictionless(method):
+    for problem in (
+        InterfaceProblem(np.eye(4), np.zeros((2, 2)), 0.3),
+        InterfaceProblem(np.eye(6), np.ones((2, 3)), 0.3),
+        InterfaceProblem(np.eye(6), -np.ones((2, 3)), 0.0),
+    ):
+        assert solve(problem, method, tol=1e-12).solved
+
+
+@dataclass(frozen=True)
+class Units:
+    force: float
+    length: float
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10**6), st.sampled_from([2, 3]), st.floats(-9, 9), st.floats(-9, 9), st.floats(0.0, 0.3))
+def test_invariance(seed, dim, force, length, mu):
+    """Units, order of the contacts, tangential basis, mirror image: the same solution, where it is unique."""
+    rng = np.random.default_rng(seed)
+    k = 5
+    A = rng.normal(size=(k * dim, k * dim))
+    base = InterfaceProblem(A @ A.T / (k * dim) + np.eye(k * dim), rng.normal(size=(k, dim)) - 0.5, mu)
+    order = rng.permutation(k)
+    turn = np.zeros((k, dim, dim))
+    turn[:, 0, 0] = 1.0
+    turn[:, 1:, 1:] = [la.qr(rng.normal(size=(dim - 1, dim - 1)))[0] for _ in range(k)]  # rotations and mirrors
+    T = la.block_diag(*turn)[(order[:, None] * dim + np.arange(dim)).ravel()]
+    f, g = 10**force, 10**length
+    q = (T @ base.q.ravel()).reshape(k, dim)
+    other = InterfaceProblem(T @ base.Q @ T.T * g / f, q * g, mu)
+    a, b = solve(base, tol=1e-11), solve(other, tol=1e-11)
+    assert a.solved and b.solved
+    assert np.allclose(T @ a.reactions.ravel(), b.reactions.ravel() / f, atol=1e-8 * (1 + np.abs(a.reactions).max()))
+
+
+@given(st.floats(1e-6, 1e6))
+@settings(max_examples=10, deadline=None)
+def test_load_scales_the_answer_where_there_is_no_gap(factor):
+    base = reduce(scenes.flat_punch(2, elements=5))
+    loaded = InterfaceProblem(base.Q, base.q, base.mu, base.V, base.s * factor)
+    a, b = solve(base, tol=1e-11), solve(loaded, tol=1e-11)
+    assert np.allclose(b.reactions / factor, a.reactions, atol=1e-8)
+
+
+def test_auto_leaves_newton_when_it_cycles(monkeypatch):
+    """The chain: a Newton method that repeats itself is given up after PATIENCE steps."""
+    problem, _ = dimensionless(rigid_bodies(1))
+    wrong = np.ones(problem.q.shape)
+    monkeypatch.setattr(
+        "contactopt.methods.newton.Newton.iterate", lambda self, p, s=None: iter([(wrong, np.zeros(0))] * 50)
+    )
+    points = []
+    for point in Auto().iterate(problem):
+        points.append(point)
+        if coulomb_equations(problem).evaluate(*point)[0] < 1e-9 or len(points) > 60:
+            break
+    assert sum(point[0] is wrong for point in points) == 7 and len(points) < 60
