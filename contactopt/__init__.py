@@ -16,7 +16,9 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from contactopt.analytic import Reference
+    from contactopt.diagnosis import Diagnosis, diagnose
     from contactopt.driver import solve
+    from contactopt.enumeration import all_solutions
     from contactopt.errors import BackendError, InputError
     from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
     from contactopt.recover import Fields
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 _HOMES = {
     "analytic": ("Reference",),
     "driver": ("solve",),
+    "diagnosis": ("Diagnosis", "diagnose"),
+    "enumeration": ("all_solutions",),
     "errors": ("BackendError", "InputError"),
     "problem": ("InterfaceProblem", "Solution", "Status", "natural_map_residual"),
     "recover": ("Fields",),

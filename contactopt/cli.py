@@ -79,7 +79,7 @@ def _list(options: argparse.Namespace) -> int:
         print(f"  {name:12} {what}")
     print("methods")
     for name, (_, _, what) in METHODS.items():
-        print(f"  {name:12} {what}")
+        print(f"  {name:20} {what}")
     for title, table in (("QP backends (normal; tangential in 2D)", QP), ("conic backends (tangential in 3D)", CONIC)):
         print(title)
         for backend in table.values():

@@ -49,6 +49,11 @@ def half_line_derivative(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.maximum(y, 0.0), (y > 0).astype(float)[:, :, None]
 
 
+def whole_line_derivative(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """No constraint: y (k, 1) itself and its derivative (k, 1, 1)."""
+    return y, np.ones((len(y), 1, 1))
+
+
 def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Projection of y (k, d) on discs |y| <= radius and its generalised derivative (k, d, d).
 

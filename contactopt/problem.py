@@ -218,9 +218,10 @@ def natural_map_residual(
     if not np.all(np.isfinite(lam)):
         return np.inf
     w = problem.q + (problem.V @ lam).reshape(r.shape)
-    u = (problem.Q @ r.ravel()).reshape(r.shape) + w
+    moved = (problem.Q @ r.ravel()).reshape(r.shape)
+    u = moved + w
     if rho is None:
-        rho = balanced_step(r, u, w)
+        rho = balanced_step(r, moved, u, w)
     size = max(np.linalg.norm(r), rho * np.linalg.norm(w), rho * np.linalg.norm(u))
     gap = 0.0
     if size > 0:
@@ -228,13 +229,14 @@ def natural_map_residual(
     return max(gap, balance_residual(problem, r))
 
 
-def balanced_step(r: np.ndarray, u: np.ndarray, w: np.ndarray) -> float:
-    """rho = |r| / min(max(|u|, |w|), |Q r|), the step of the natural map at which no error is hidden by units."""
-    norms = [float(np.linalg.norm(x)) for x in (r, u, w, u - w)]
-    distance = max(norms[1], norms[2])
-    if norms[0] == 0 or distance == 0:
-        return 1.0
-    return norms[0] / min(distance, max(norms[3] * 1e6, 1e-300))
+def balanced_step(r: np.ndarray, moved: np.ndarray, u: np.ndarray, w: np.ndarray) -> float:
+    """rho = |r| / min(max(|u|, |w|), 1e6 |Q r|): the step of the natural map at which no choice of units hides an error.
+
+    The second term counts where r is next to nothing (open contact): there |r| alone says nothing about the scale.
+    """
+    force, change, *distances = (float(np.linalg.norm(x)) for x in (r, moved, u, w))
+    distance = min(max(distances), 1e6 * change)
+    return force / distance if force > 0 and distance > 0 else 1.0
 
 
 def balance_residual(problem: InterfaceProblem, reactions: np.ndarray) -> float:

@@ -72,13 +72,23 @@ def test_a_backend_that_fails_is_a_status_that_names_it(monkeypatch, punch, answ
     assert solution.reactions.shape == punch.q.shape and np.all(np.isfinite(solution.reactions))
 
 
-def test_a_backend_that_lies_is_not_believed(monkeypatch, punch):
-    """Whatever it claims, the residual of what comes back is recomputed from the problem."""
-    fake(monkeypatch, lambda p: np.full(len(p.q), 5.0))
-    monkeypatch.setattr("contactopt.methods.alternating.crossover", lambda Q, c, V, s, P, r, lam: (r, lam))
+def test_a_backend_that_lies_is_asked_again_and_then_reported(monkeypatch, punch):
+    """Whatever it claims, what comes back is checked against the problem: here a vector that no crossover can save."""
+    asked = []
+    fake(monkeypatch, lambda p: asked.append(p) or np.full(len(p.q), 5.0))
+    monkeypatch.setattr("contactopt.semismooth.STEPS", 1)
     solution = solve(punch, "alternating", max_iterations=3)
-    assert not solution.solved
+    assert solution.status.label == "backend_failed" and "proxqp" in solution.message and "twice" in solution.message
+    assert len(asked) == 2
     assert solution.residual == natural_map_residual(punch, solution.reactions, solution.multipliers) > 1e-3
+
+
+def test_tighter_settings_are_tighter():
+    for table in (QP, CONIC):
+        for backend in table.values():
+            loose, tight = backend.settings, backend.tightened().settings
+            assert all(tight[key] <= loose[key] for key in loose)
+            assert tight != loose or backend.name == "quadprog"
 
 
 def test_box_qp_multiplier_sign():

@@ -64,6 +64,12 @@ def test_unloaded_problem_at_rest():
     assert natural_map_residual(problem, np.zeros((1, 2))) == 0.0
 
 
+@pytest.mark.parametrize("noise", [1e-15, 1e-17, 1e-200, 5e-324])
+def test_rounding_in_an_open_contact_is_no_error(noise):
+    with np.errstate(all="raise", under="ignore"):
+        assert natural_map_residual(one_contact((0.8, 1.0), mu=1.0), [[noise, 0.0]]) < 1e-8
+
+
 def test_bilateral_contact_carries_tension_and_its_friction():
     problem = InterfaceProblem(np.eye(2), [[2.0, 0.5]], 0.3, bilateral=True)  # r_n = -2 keeps u_n = 0
     assert natural_map_residual(problem, [[-2.0, -0.5]]) < 1e-15

@@ -6,14 +6,18 @@ them gets wrong is caught afterwards by the crossover and the certificate, never
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any
 
+import numpy as np
+
 from contactopt.errors import InputError
 
+Answer = tuple[np.ndarray, np.ndarray]  # what a bridge returns: forces, multipliers
 TIGHT = 1e-9  # accuracy asked of every backend, in dimensionless units
 
 
@@ -30,6 +34,11 @@ class Backend:
     package: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     sparse: bool = False
+
+    def tightened(self) -> Backend:
+        """The same backend, asked for a thousand times the accuracy."""
+        tighter = {key: value / 1e3 if value == TIGHT else value for key, value in self.settings.items()}
+        return replace(self, settings=tighter)
 
     @property
     def installed(self) -> bool:
@@ -87,6 +96,13 @@ CONIC: dict[str, Backend] = {
         Backend("cvxopt", "conic", "cvxopt", "cvxopt", {"abstol": TIGHT, "reltol": TIGHT, "feastol": TIGHT}),
     )
 }
+
+
+def attempts(solver: Any, solve: Callable[[Any], Answer]) -> Iterator[tuple[str, Callable[[], Answer]]]:
+    """For semismooth.certified: a bridge (BoxQP, DiscSOCP) with its backend as it is, then at tighter settings."""
+    for backend in (solver.backend, solver.backend.tightened()):
+        bridge = replace(solver, backend=backend)
+        yield backend.name, partial(solve, bridge)
 
 
 def find(name: str, table: Mapping[str, Backend]) -> Backend:

@@ -38,6 +38,17 @@ METHODS = {
     "tresca": ("contactopt.methods.tresca", "Tresca", "successive convex problems with given friction bounds"),
     "acary_cadoux": ("contactopt.methods.cone", "AcaryCadoux", "fixed point on the SOCP over Coulomb's cones"),
     "relaxation": ("contactopt.methods.cone", "Relaxation", "one SOCP: associated friction, another law (dilatancy)"),
+    "penalty": ("contactopt.methods.penalty", "Penalty", "penalty method, minimised exactly; error ~ 1 / factor"),
+    "lagrangian": ("contactopt.methods.lagrangian", "Lagrangian", "normal QP, then Uzawa's multipliers for friction"),
+    "augmented_lagrangian": (
+        "contactopt.methods.augmented_lagrangian",
+        "AugmentedLagrangian",
+        "method of multipliers, exact or Uzawa",
+    ),
+    "nsgs": ("contactopt.methods.nsgs", "NSGS", "nonsmooth Gauss-Seidel, contact by contact"),
+    "admm": ("contactopt.methods.admm", "ADMM", "alternating direction method of multipliers"),
+    "apg": ("contactopt.methods.apg", "APG", "accelerated projected gradient in a fixed point"),
+    "lemke": ("contactopt.methods.complementarity", "Lemke", "Lemke's method on the 2D complementarity problem; small"),
     "alternating": (
         "contactopt.methods.alternating",
         "Alternating",

@@ -6,7 +6,8 @@ Tangential problem, r_n fixed (eq (22)): a box-constrained QP with one tangentia
     min  r_t' Q_tt r_t / 2 + (q_t + Q_tn r_n + V_t lambda)' r_t    subject to  |r_t| <= mu |r_n|.
 The multipliers of the balance rows are the plates' displacements. Plates that move tangentially only belong to the
 tangential problem. Each iteration costs one QP and one QP or SOCP. It contracts where friction couples weakly to the
-normal force (small mu, similar bodies) and may cycle otherwise; relaxation < 1 then often helps.
+normal force (small mu, similar bodies) and may cycle otherwise; relaxation < 1 then often helps. A backend's answer is
+made exact by active-set steps, or asked for again at tighter settings.
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactopt.backends import CONIC, QP, find
+from contactopt.backends import CONIC, QP, attempts, find
 from contactopt.backends.conic import DiscSOCP
 from contactopt.backends.qp import BoxQP
-from contactopt.cones import disc_derivative, half_line_derivative
+from contactopt.cones import disc_derivative, half_line_derivative, whole_line_derivative
 from contactopt.errors import InputError
 from contactopt.methods import Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.scene import check_number
-from contactopt.semismooth import crossover
+from contactopt.semismooth import Equations, certified
 
 
 @dataclass(frozen=True)
@@ -81,10 +82,10 @@ class NormalProblem:
         """r_n (k,) and the multipliers of this problem's balance rows."""
         c = self.problem.q[:, 0] + self.Q_nt @ r_t.ravel() + self.V_other @ multipliers[~self.columns]
         s = self.problem.s[self.columns] + self.V_t.T @ r_t.ravel()
-        r, lam = self.qp.solve(c, -s, self.low, np.full(len(c), np.inf), start=r_n)
-        project = _whole_line if self.problem.bilateral else half_line_derivative
-        polished, lam = crossover(self.Q, c, self.V, s, project, r[:, None], lam)
-        return polished[:, 0], lam
+        project = whole_line_derivative if self.problem.bilateral else half_line_derivative
+        tries = attempts(self.qp, lambda qp: qp.solve(c, -s, self.low, np.full(len(c), np.inf), start=r_n))
+        r, lam = certified(tries, Equations(self.Q, c[:, None], self.V, s, project))
+        return r[:, 0], lam
 
 
 class TangentialProblem:
@@ -110,11 +111,8 @@ class TangentialProblem:
         s = self.problem.s[self.columns] + self.V_n.T @ r_n
         radius = self.problem.mu * np.abs(r_n)
         if isinstance(self.solver, BoxQP):
-            r, lam = self.solver.solve(c, -s, -radius, radius, start=r_t.ravel())
+            tries = attempts(self.solver, lambda qp: qp.solve(c, -s, -radius, radius, start=r_t.ravel()))
         else:
-            r, lam = self.solver.solve(c, -s, radius)
-        return crossover(self.Q, c, self.V, s, lambda y: disc_derivative(y, radius), r.reshape(r_t.shape), lam)
-
-
-def _whole_line(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return y, np.ones((len(y), 1, 1))
+            tries = attempts(self.solver, lambda socp: socp.solve(c, -s, radius))
+        discs = Equations(self.Q, c.reshape(r_t.shape), self.V, s, lambda y: disc_derivative(y, radius))
+        return certified(tries, discs)

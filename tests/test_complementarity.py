@@ -1,0 +1,214 @@
+import itertools
+
+import numpy as np
+import pytest
+from conftest import one_contact
+
+from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
+from contactopt.enumeration import all_solutions
+from contactopt.methods.complementarity import Lemke, complementarity_problem, lemke
+from contactopt.problem import dimensionless
+
+
+def random_problem(seed: int, mu: float, plate: bool = False, contacts: int = 3) -> InterfaceProblem:
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(2 * contacts, 4 * contacts))
+    V = np.zeros((2 * contacts, int(plate)))
+    V[::2] = 1.0
+    return InterfaceProblem(A @ A.T, rng.normal(size=(contacts, 2)) * 9, mu, V, -np.ones(int(plate)))
+
+
+def by_brute_force(problem: InterfaceProblem) -> list[np.ndarray]:
+    """Reactions of all solutions: the linear system of each of the 4^k combinations of open, stick, slip."""
+    k, p = problem.contacts, len(problem.s)
+    found: list[np.ndarray] = []
+    for states in itertools.product(("open", "stick", 1, -1), repeat=k):
+        A, b = np.hstack([problem.Q, problem.V]), -problem.q.ravel()
+        for i, state in enumerate(states):
+            if state == "open":
+                A[2 * i : 2 * i + 2] = np.eye(2 * k + p)[2 * i : 2 * i + 2]
+                b[2 * i : 2 * i + 2] = 0.0
+            elif state != "stick":
+                A[2 * i + 1] = np.eye(2 * k + p)[2 * i + 1]
+                A[2 * i + 1, 2 * i], b[2 * i + 1] = state * problem.mu[i], 0.0
+        A, b = np.vstack([A, np.hstack([problem.V.T, np.zeros((p, p))])]), np.append(b, -problem.s)
+        x = np.linalg.lstsq(A, b, rcond=None)[0]
+        r = x[: 2 * k].reshape(k, 2)
+        if natural_map_residual(problem, r, x[2 * k :]) < 1e-9 and not any(np.allclose(r, y, atol=1e-7) for y in found):
+            found.append(r)
+    return found
+
+
+def test_lemke_on_a_known_lcp():
+    z = lemke(np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-5.0, -6.0]))
+    assert z == pytest.approx([4 / 3, 7 / 3], abs=1e-14)
+    assert not np.any(lemke(np.eye(2), np.ones(2)))
+
+
+def test_lemke_says_when_there_is_no_solution():
+    """w1 = -z1 - 1 can never be nonnegative."""
+    assert lemke(np.array([[-1.0, 0.0], [0.0, 1.0]]), np.array([-1.0, 1.0])) is None
+
+
+def test_lemke_ends_on_degenerate_ties():
+    """Every ratio ties: blocks of ones, equal right sides, and a zero one."""
+    M = np.kron(np.eye(3), np.ones((4, 4))) + np.kron(np.ones((3, 3)), np.eye(4))
+    for q in (-np.ones(12), np.repeat([-1.0, 0.0, -1.0], 4), np.tile([0.0, -1.0], 6)):
+        z = lemke(M, q)
+        w = M @ z + q
+        assert z.min() >= 0 and w.min() > -1e-12 and np.abs(z * w).max() < 1e-12
+
+
+@pytest.mark.parametrize("copositive", [False, True])
+@pytest.mark.parametrize("plate", [False, True])
+def test_both_forms_are_coulombs_problem(copositive, plate):
+    for seed in range(20):
+        problem = random_problem(seed, 0.7, plate)
+        M, q, C = complementarity_problem(problem, copositive)
+        z = lemke(M, q)
+        lam = z[-2:-1] - z[-1:] if plate else np.zeros(0)
+        assert natural_map_residual(problem, (C @ z[: C.shape[1]]).reshape(3, 2), lam) < 1e-12
+
+
+def test_copositive_form_is_copositive_at_any_friction():
+    M = complementarity_problem(random_problem(0, 50.0, True), copositive=True)[0]
+    z = np.random.default_rng(0).exponential(size=(2000, len(M)))
+    assert np.einsum("ij,jk,ik->i", z, M, z).min() >= -1e-10 * np.abs(M).max()
+    classic = complementarity_problem(random_problem(0, 50.0, True))[0]
+    z = np.random.default_rng(0).exponential(size=(2000, len(classic)))
+    assert np.einsum("ij,jk,ik->i", z, classic, z).min() < 0  # why there are two
+
+
+def test_strong_friction_where_the_classic_form_ends_on_a_ray():
+    """Some of these defeat the classic form; none defeats the method."""
+    rays = 0
+    for seed in range(120):
+        rng = np.random.default_rng(seed)
+        k = int(rng.integers(1, 7))
+        A = rng.normal(size=(2 * k, 2 * k))
+        problem = InterfaceProblem(A @ A.T, rng.normal(size=(k, 2)), 20.0)
+        M, q, _ = complementarity_problem(dimensionless(problem)[0])
+        rays += lemke(M, q) is None
+        assert solve(problem, Lemke()).solved, seed
+    assert rays > 0
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.15, 0.5])
+@pytest.mark.parametrize("elements", [4, 8])
+def test_agrees_with_newton_on_the_punch(elements, mu):
+    problem = reduce(scenes.flat_punch(2, elements=elements, mu=mu))
+    solution, reference = solve(problem, Lemke(), tol=1e-12), solve(problem, tol=1e-11)
+    assert solution.solved and solution.iterations == 1
+    assert np.allclose(solution.reactions, reference.reactions, atol=1e-7)
+    assert np.allclose(solution.multipliers, reference.multipliers, rtol=1e-8)
+
+
+def test_two_plate_motions():
+    """A second plate column, tangential: the plate is dragged by a third of the limit, and one contact has no friction."""
+    k = 4
+    A = np.random.default_rng(3).normal(size=(2 * k, 4 * k))
+    V = np.zeros((2 * k, 2))
+    V[::2, 0] = V[1::2, 1] = 1.0
+    problem = InterfaceProblem(A @ A.T, np.zeros((k, 2)), [0.5, 0.5, 0.0, 0.5], V, np.array([-3.0, 0.2]))
+    solution = solve(problem, Lemke(), tol=1e-10)
+    assert solution.solved
+    assert solution.reactions.sum(axis=0) == pytest.approx([3.0, -0.2], abs=1e-10)
+
+
+def test_a_system_in_rest_and_units():
+    assert not np.any(solve(InterfaceProblem(np.eye(2), [[1.0, 0.3]], 0.5), Lemke()).reactions)
+    punch = reduce(scenes.flat_punch(2, elements=4))
+    large = InterfaceProblem(punch.Q * 1e-9, punch.q, punch.mu, punch.V, punch.s * 1e9)
+    assert np.allclose(solve(large, Lemke()).reactions / 1e9, solve(punch, Lemke()).reactions, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        InterfaceProblem(np.eye(3), np.zeros((1, 3)), 0.3),
+        InterfaceProblem(np.eye(2), np.zeros((1, 2)), 0.3, bilateral=True),
+        InterfaceProblem(np.eye(602), np.zeros((301, 2)), 0.3),
+    ],
+)
+def test_problems_it_cannot_take(problem):
+    with pytest.raises(InputError, match="2D unilateral problem of at most"):
+        solve(problem, Lemke())
+    with pytest.raises(InputError, match="2D unilateral problem of at most"):
+        all_solutions(problem)
+
+
+def test_lemke_is_refused_in_3d_before_any_work():
+    with pytest.raises(InputError, match="2D"):
+        Lemke().backends(3)
+
+
+def test_one_contact_with_three_solutions():
+    """K = [[1, 1.5], [1.5, 4]], f = (.8, 1), mu = 1: open, slip and stick."""
+    found = all_solutions(one_contact((0.8, 1.0), 1.0))
+    assert sorted(tuple(np.round(s.reactions[0], 12)) for s in found) == [(0.0, 0.0), (0.4, 0.4), (1.0, 0.8)]
+    assert all(s.solved and s.residual < 1e-12 for s in found)
+    assert len(all_solutions(one_contact((0.8, 1.0), 1.0), limit=2)) == 2
+
+
+def test_one_contact_with_one_solution():
+    (only,) = all_solutions(one_contact((-10.0, 1.0), 1.0))
+    assert only.reactions[0] == pytest.approx([6.4, -6.4], abs=1e-12)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.2, 0.3])
+def test_one_triangle_loses_uniqueness_at_three_minus_four_nu(nu):
+    """Contact node (0, 0), clamped at (1, 0) and (0, 1): K_tt / |K_tn| = 3 - 4 nu. The load is one of uniform slip."""
+    first, shear = nu / ((1 + nu) * (1 - 2 * nu)), 0.5 / (1 + nu)  # Lame's constants over E
+    K = np.array([[first + 3 * shear, first + shear], [first + shear, first + 3 * shear]])
+    Q = np.linalg.inv(K)
+    count = []
+    for factor in (0.999, 1.001):
+        mu = factor * (3 - 4 * nu)
+        loads = []
+        for way in (1.0, -1.0):
+            r, u = np.array([1.0, -way * mu]), np.array([0.0, way])
+            loads.append(len(all_solutions(InterfaceProblem(Q, [u - Q @ r], mu))))
+        count.append(max(loads))
+    assert count == [1, 3]
+
+
+@pytest.mark.parametrize("plate", [False, True])
+def test_the_list_is_complete(plate):
+    """Against all 64 combinations, with loads that make all contacts slip, at friction strong enough for several."""
+    counts = set()
+    for seed in range(15):
+        base = random_problem(seed, 4.0, plate)
+        way = np.random.default_rng(seed).choice([-1.0, 1.0], 3)
+        r, u = np.stack([np.ones(3) / 3, -4 / 3 * way], axis=1), np.stack([np.zeros(3), 9 * way], axis=1)
+        problem = InterfaceProblem(base.Q, u - (base.Q @ r.ravel()).reshape(3, 2), base.mu, base.V, base.s)
+        expected, found = by_brute_force(problem), all_solutions(problem)
+        assert len(found) == len(expected), seed
+        assert all(any(np.allclose(s.reactions, r, atol=1e-7) for r in expected) for s in found), seed
+        counts.add(len(found))
+    assert 1 in counts and max(counts) > 1
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.15, 0.5])
+def test_the_punch_has_one_solution(mu):
+    problem = reduce(scenes.flat_punch(2, elements=4, mu=mu))
+    (only,) = all_solutions(problem)
+    reference = solve(problem, tol=1e-11)
+    assert np.allclose(only.reactions, reference.reactions, atol=1e-7)
+    assert np.allclose(only.multipliers, reference.multipliers, rtol=1e-7)
+
+
+def test_a_point_where_states_meet_is_listed_once():
+    """Grazing contact: u = 0 and r = 0 is open, stuck and slipping both ways."""
+    problem = InterfaceProblem(np.eye(4), [[0.0, 0.0], [-1.0, 0.5]], 0.5)  # the second one sticks at its limit
+    (only,) = all_solutions(problem)
+    assert only.reactions == pytest.approx(np.array([[0.0, 0.0], [1.0, -0.5]]))
+
+
+def test_no_finite_bound_no_list():
+    with pytest.raises(InputError, match="positive definite"):
+        all_solutions(InterfaceProblem(np.ones((2, 2)), -np.ones((1, 2)), 0.5))
+    dragged = InterfaceProblem(np.eye(2), np.zeros((1, 2)), 0.5, np.eye(2), np.array([-1.0, 0.2]))
+    with pytest.raises(InputError, match="press"):
+        all_solutions(dragged)
+    with pytest.raises(InputError, match="limit"):
+        all_solutions(one_contact((0.8, 1.0), 1.0), limit=0)

@@ -1,0 +1,101 @@
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import one_contact
+
+from contactopt import InputError, InterfaceProblem, fclib, reduce, scenes, solve
+from contactopt.methods.nsgs import NSGS, Local
+from contactopt.problem import natural_map_residual
+
+LIBRARY = Path(__file__).parents[2] / "shared" / "fclib"
+
+
+def law_violation(W, v, mu, r, bilateral):
+    """Largest violation of Coulomb's law, written out by cases, without the natural map."""
+    u = W @ r + v
+    slip, force = np.linalg.norm(u[1:]), np.linalg.norm(r[1:])
+    bound = mu * abs(r[0])
+    normal = abs(u[0]) if bilateral else max(-u[0], -r[0], min(abs(u[0]), abs(r[0])))
+    opposed = np.linalg.norm(slip * r[1:] + bound * u[1:])  # r_t = -bound u_t / |u_t|
+    return max(normal, force - bound, opposed)
+
+
+@pytest.mark.parametrize("dim,bilateral", [*product((2, 3), (False, True))])
+def test_local_problems_obey_the_law(dim, bilateral):
+    rng = np.random.default_rng(dim)
+    states = set()
+    for trial in range(400):
+        A = rng.normal(size=(dim, dim))
+        W, v = A @ A.T + 0.05 * np.eye(dim), rng.normal(size=dim)
+        mu = 0.0 if trial % 10 == 0 else rng.uniform(0.05, 1.5)
+        r = Local(W, mu, bilateral).solve(v.tolist())
+        assert law_violation(W, v, mu, r, bilateral) < 1e-9 * (1 + np.linalg.norm(r)) ** 2
+        states.add("open" if not r.any() else "slip" if np.linalg.norm((W @ r + v)[1:]) > 1e-9 else "stick")
+    assert states >= {"slip", "stick"} and ("open" in states) != bilateral
+
+
+def test_a_contact_without_compliance_carries_nothing():
+    assert not Local(np.zeros((3, 3)), 0.5, False).solve([-1.0, 0.0, 0.0]).any()
+
+
+@pytest.mark.parametrize("force,expected", [((-10.0, 1.0), (6.4, -6.4)), ((0.8, 1.0), (0.0, 0.0))])
+def test_one_contact_takes_one_sweep(force, expected):
+    solution = solve(one_contact(force, 1.0), NSGS())
+    assert solution.iterations == 1 and solution.solved
+    assert solution.reactions[0] == pytest.approx(expected, abs=1e-10)
+
+
+@pytest.mark.parametrize("scene", ["punch", "cube"])
+def test_it_finds_the_solution_of_the_default_method(scene, request):
+    problem = request.getfixturevalue(scene)
+    exact = solve(problem, tol=1e-12)
+    solution = solve(problem, NSGS(), tol=1e-9, max_iterations=1000)
+    assert solution.solved
+    assert np.allclose(solution.reactions, exact.reactions, atol=1e-6 * exact.reactions.max())
+    assert np.allclose(solution.multipliers, exact.multipliers, rtol=1e-6)
+
+
+@pytest.mark.parametrize("options", [{"mu": 0.0}, {"bilateral": True}, {"mu": 0.1}])
+def test_scenes(options):
+    assert solve(reduce(scenes.flat_punch(2, elements=5, **options)), NSGS(), max_iterations=1000).solved
+
+
+@pytest.mark.parametrize("relaxation", [0.7, 1.4])
+def test_relaxation_changes_the_way_not_the_answer(relaxation, punch):
+    plain, relaxed = (solve(punch, NSGS(w), tol=1e-10, max_iterations=2000) for w in (1.0, relaxation))
+    assert relaxed.solved and relaxed.iterations != plain.iterations
+    assert np.allclose(relaxed.reactions, plain.reactions, atol=1e-7 * plain.reactions.max())
+
+
+def test_every_iterate_obeys_the_bounds(cube):
+    for sweeps in (1, 3, 10):
+        r = solve(cube, NSGS(1.5), max_iterations=sweeps).reactions
+        assert r[:, 0].min() >= 0
+        assert np.all(np.linalg.norm(r[:, 1:], axis=1) <= cube.mu * r[:, 0] * (1 + 1e-9) + 1e-12)
+
+
+def test_redundant_contacts():
+    """Three nodes on two modes: Q has rank 4 of 9, forces are not unique, the displacements are."""
+    rng = np.random.default_rng(5)
+    H = rng.normal(size=(9, 4))
+    problem = InterfaceProblem(H @ H.T, -np.abs(rng.normal(size=(3, 3))), 0.4)
+    reactions = [solve(problem, NSGS(w), tol=1e-9, max_iterations=5000) for w in (1.0, 0.6)]
+    for a in reactions:
+        assert a.solved and natural_map_residual(problem, a.reactions) < 1e-9
+    u = [problem.displacements(a.reactions, a.multipliers) for a in reactions]
+    assert np.allclose(u[0], u[1], atol=1e-6)
+
+
+@pytest.mark.skipif(not LIBRARY.is_dir(), reason="the FCLib files are not here")
+@pytest.mark.parametrize("name", ["Box_Stacks", "CubeH8", "LMGC_100_PR_PerioBox"])
+def test_fclib(name):
+    problem = fclib.read(next(LIBRARY.glob(f"{name}*.hdf5")))
+    assert solve(problem, NSGS(), tol=1e-6, max_iterations=1500).solved
+
+
+@pytest.mark.parametrize("relaxation", [0.0, 2.0, np.nan])
+def test_bad_relaxation(relaxation):
+    with pytest.raises(InputError, match="relaxation"):
+        NSGS(relaxation)
