@@ -61,11 +61,15 @@ def solve(
     while True:
         begin = time.perf_counter()
         try:
-            iterate = next(steps, None)
+            with np.errstate(all="ignore"):  # what overflows is seen below
+                iterate = next(steps, None)
         except BackendError as error:
             message, status = str(error), Status.BACKEND_FAILED
             break
         if iterate is None:
+            break
+        if not all(np.all(np.isfinite(part)) for part in iterate):
+            status = Status.DIVERGED
             break
         ended = recorder.record(*iterate, time.perf_counter() - begin)
         if ended is not None:

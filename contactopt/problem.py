@@ -33,6 +33,7 @@ class Status(Enum):
     TIME_LIMIT = "time_limit", "the time ran out with the certificate above the tolerance"
     CYCLING = "cycling", "the iteration came back to an earlier state, so it cannot converge; try relaxation"
     STALLED = "stalled", "the iterate no longer changes, but the certificate is above the tolerance"
+    DIVERGED = "diverged", "the iterates grew without bound; the last finite one is kept"
     BACKEND_FAILED = "backend_failed", "a QP or conic backend gave no usable answer"
 
     def __init__(self, label: str, sentence: str):
@@ -54,7 +55,8 @@ class InterfaceProblem:
     areas        (k,) nodal areas, force / area = traction; ones by default
     coordinates  (d, k) positions of the nodes, for output only; 0, 1, 2, ... by default
     bilateral    no separation: u_n = 0, friction bound mu |r_n|
-    Raises InputError on wrong shapes, numbers that are not finite, negative mu or an unsymmetric Q.
+    Raises InputError on wrong shapes, numbers that are not finite, negative mu, an unsymmetric Q or one with a negative
+    diagonal (an indefinite Q is not looked for: its answers are certified like any other).
     """
 
     Q: np.ndarray
@@ -93,6 +95,8 @@ class InterfaceProblem:
             raise InputError(f"the friction coefficient mu must not be negative; its least value is {self.mu.min():g}.")
         if np.abs(self.Q - self.Q.T).max(initial=0.0) > 1e-2 * np.abs(self.Q).max(initial=0.0):
             raise InputError("Q must be symmetric (to 1 %); check the order of its rows and columns.")
+        if np.diag(self.Q).min(initial=0.0) < -1e-12 * np.abs(self.Q).max(initial=0.0):
+            raise InputError("Q must be positive semidefinite, but it has a negative diagonal entry; check its sign.")
 
     @property
     def contacts(self) -> int:

@@ -32,7 +32,7 @@ class Method(Protocol):
 
 # name -> (module, class, what it is)
 METHODS = {
-    "auto": ("contactopt.methods.auto", "Auto", "Newton, then proximal where Newton fails; the default"),
+    "auto": ("contactopt.methods.auto", "Auto", "Newton, then cones and proximal where it fails; the default"),
     "newton": ("contactopt.methods.newton", "Newton", "semismooth Newton on the Alart-Curnier equations"),
     "proximal": ("contactopt.methods.proximal", "Proximal", "proximal-point loop around Newton"),
     "tresca": ("contactopt.methods.tresca", "Tresca", "successive convex problems with given friction bounds"),

@@ -14,6 +14,7 @@ Distributed Optimization and Statistical Learning via ADMM, for the iteration an
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -84,7 +85,9 @@ class Balanced:
         n = len(problem.Q)
         matrix = problem.Q.T.copy()  # LAPACK factorises the transpose of a C array in place
         matrix[np.arange(n), np.arange(n)] += rho
-        self.factor = la.lu_factor(matrix.T, overwrite_a=True, check_finite=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", la.LinAlgWarning)  # an indefinite Q: the driver sees what comes of it
+            self.factor = la.lu_factor(matrix.T, overwrite_a=True, check_finite=False)
         self.V = problem.V
         self.motions = la.lu_solve(self.factor, problem.V, check_finite=False)
         self.schur = problem.V.T @ self.motions

@@ -1,9 +1,11 @@
-"""The default, without a number to choose: Newton's method, then the proximal loop, then the loop from other starts.
+"""The default, without a number to choose: Newton's method, and where it fails cones, then the proximal loop.
 
 1. Newton's method from the bonded solution (or no force at all) while its residual falls: elastic bodies end here, after
    1 to 11 steps of one dense linear system each.
-2. The proximal loop from the best point reached: rank-deficient Q (rigid bodies, redundant contacts), cycles.
-3. When ROUND outer iterations have not halved the residual, the loop starts again from contact forces drawn at random
+2. CONES iterations of the Acary-Cadoux fixed point: convex programs, which no cycle and no rank deficiency of Q disturbs.
+   Most problems of rigid bodies end here.
+3. The proximal loop from there, which needs no symmetric Q and no backend.
+4. When ROUND outer iterations have not halved the residual, the loop starts again from contact forces drawn at random
    (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong friction may have solutions that
    repel the loop and others that attract it.
 It ends where the driver's certificate or limits say so. There is no proof that it finds a solution: Coulomb's problem
@@ -14,11 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
 from contactopt.cones import coulomb_cone
+from contactopt.errors import BackendError
 from contactopt.methods import NATIVE, Iterate
+from contactopt.methods.cone import AcaryCadoux
 from contactopt.methods.newton import Newton, cold_start, coulomb_equations
 from contactopt.methods.proximal import Proximal
 from contactopt.problem import InterfaceProblem
@@ -26,6 +31,7 @@ from contactopt.problem import InterfaceProblem
 LIMIT = 25  # Newton steps
 PATIENCE = 6  # of them without progress
 PROGRESS = 0.9  # a residual that falls by less is no progress
+CONES = 5  # cone programs
 ROUND = 20  # outer iterations of the proximal loop that must halve the residual
 LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 
@@ -39,6 +45,7 @@ class Auto:
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         reached = yield from self._newton(problem, start)
+        reached = yield from self._cones(problem, reached)
         random = np.random.default_rng(0)
         while True:
             last = yield from self._proximal(problem, reached)
@@ -61,6 +68,22 @@ class Auto:
             if since >= PATIENCE or count >= LIMIT:
                 break
         return reached or cold_start(problem)
+
+    @staticmethod
+    def _cones(problem: InterfaceProblem, start: Iterate) -> Generator[Iterate, None, Iterate]:
+        """A few cone programs; returns the best point, `start` if there was none better."""
+        if problem.bilateral:
+            return start
+        equations = coulomb_equations(problem)
+        best, reached = equations.evaluate(*start)[0], start
+        try:
+            for point in islice(AcaryCadoux().iterate(problem), CONES):
+                yield point
+                residual = equations.evaluate(*point)[0]
+                best, reached = min((best, reached), (residual, point), key=lambda pair: pair[0])
+        except BackendError:  # no answer: the proximal loop needs none
+            pass
+        return reached
 
     @staticmethod
     def _proximal(problem: InterfaceProblem, start: Iterate) -> Generator[Iterate, None, Iterate]:

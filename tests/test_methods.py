@@ -1,0 +1,90 @@
+"""One contract for every method of the table."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from contactopt import InputError, InterfaceProblem, Status, natural_map_residual, reduce, scenes, solve
+from contactopt.methods import METHODS, find_method
+
+ALL = sorted(METHODS)
+OTHER_LAW = {"relaxation"}  # solves associated friction: agrees only where nothing slips
+APPROXIMATE = {"penalty"}  # a certificate of about 1e-6 by construction
+PLANE = {"lemke"}
+TOL = 1e-7
+
+
+@pytest.fixture(scope="module")
+def problems():
+    flat = reduce(scenes.flat_punch(2, elements=6, mu=0.2))
+    rng = np.random.default_rng(2)
+    A = rng.normal(size=(12, 12))
+    free = InterfaceProblem(A @ A.T / 12 + np.eye(12), rng.normal(size=(6, 2)) - 0.5, 0.2)
+    solid = reduce(scenes.flat_punch(3, elements=3, mu=0.2))
+    found = {"plate, 2D": flat, "no plate, 2D": free, "plate, 3D": solid}
+    return {name: (problem, solve(problem, tol=1e-11)) for name, problem in found.items()}
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_settings_are_fields_of_a_frozen_object_with_defaults(name):
+    method = find_method(name)
+    assert dataclasses.is_dataclass(method) and method == find_method(name)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        method.anything = 1
+    with pytest.raises(InputError, match=name):
+        find_method(name, no_such_setting=1)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_method_gives_the_certified_answer_or_says_why_not(name, problems):
+    for label, (problem, exact) in problems.items():
+        if name in PLANE and problem.dim == 3:
+            with pytest.raises(InputError, match="2D"):
+                solve(problem, name)
+            continue
+        tol = 1e-4 if name in APPROXIMATE else TOL
+        solution = solve(problem, name, tol=tol, max_iterations=20_000, time_limit=20)
+        assert solution.reactions.shape == problem.q.shape
+        assert solution.residual == natural_map_residual(problem, solution.reactions, solution.multipliers)
+        assert solution.solved == (solution.residual <= tol)
+        if name in OTHER_LAW:
+            assert solution.solved or solution.status is Status.SETTLED
+            continue
+        assert solution.solved, f"{label}: {solution.message} ({solution.residual:.1e})"
+        size = np.abs(exact.reactions).max()
+        assert np.allclose(solution.reactions, exact.reactions, atol=100 * tol * size), label
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_limits_hold_for_every_method(name, problems):
+    problem, _ = problems["plate, 2D"]
+    solution = solve(problem, name, tol=1e-30, max_iterations=2)
+    assert solution.iterations <= 2 and not solution.solved
+    assert np.all(np.isfinite(solution.reactions))
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_open_contacts_carry_nothing(name):
+    solution = solve(InterfaceProblem(np.eye(4), np.ones((2, 2)), 0.3), name, tol=1e-8, max_iterations=1000)
+    assert solution.solved and np.abs(solution.reactions).max() < 1e-7
+
+
+@pytest.mark.parametrize("name", sorted(set(ALL) - OTHER_LAW))
+def test_a_start_at_the_solution_is_kept(name, problems):
+    problem, exact = problems["plate, 2D"]
+    solution = solve(problem, name, tol=1e-4, start=exact, max_iterations=3)
+    assert solution.solved
+
+
+def test_indefinite_compliance_is_not_called_solved():
+    with pytest.raises(InputError, match="semidefinite"):
+        InterfaceProblem(np.diag([1.0, -1.0]), np.zeros((1, 2)), 0.3)
+    Q = np.kron(np.array([[1.0, 2.0], [2.0, 1.0]]), np.eye(2))
+    problem = InterfaceProblem(Q, -np.ones((2, 2)), 0.3)
+    for name in ALL:
+        try:
+            solution = solve(problem, name, max_iterations=50, time_limit=5)
+        except InputError:
+            continue
+        assert solution.solved == (natural_map_residual(problem, solution.reactions, solution.multipliers) <= 1e-8)
