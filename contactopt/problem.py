@@ -193,6 +193,7 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     return scaled, Scales(force, length, length / columns)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # numbers beyond the range of floats are no solution
 def natural_map_residual(
     problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray | None = None, rho: float | None = None
 ) -> float:
@@ -228,9 +229,10 @@ def natural_map_residual(
         rho = balanced_step(r, moved, u, w)
     size = max(np.linalg.norm(r), rho * np.linalg.norm(w), rho * np.linalg.norm(u))
     gap = 0.0
-    if size > 0:
+    if size != 0:
         gap = float(np.linalg.norm(r - friction_cone(r, u, rho, problem.mu, problem.bilateral)) / size)
-    return max(gap, balance_residual(problem, r))
+    worst = np.max([gap, balance_residual(problem, r)])
+    return float(worst) if np.isfinite(worst) else np.inf
 
 
 def balanced_step(r: np.ndarray, moved: np.ndarray, u: np.ndarray, w: np.ndarray) -> float:

@@ -90,6 +90,13 @@ def test_multipliers_are_found_from_the_reactions(punch):
     assert np.allclose(fit_multipliers(punch, solution.reactions), solution.multipliers, rtol=1e-8)
 
 
+def test_reactions_beyond_the_range_of_floats(punch):
+    for size in (1e200, 1e308):
+        with np.errstate(all="raise"):
+            residual = natural_map_residual(punch, np.full(punch.q.shape, size))
+        assert residual > 1e-3
+
+
 def test_reactions_that_are_not_finite(punch):
     assert natural_map_residual(punch, np.full(punch.q.shape, np.nan)) == np.inf
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from contactopt.methods import METHODS
+
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 
@@ -13,6 +15,11 @@ README = (ROOT / "README.md").read_text()
 def test_python_examples_run(code, capsys):
     exec(compile(code, "README.md", "exec"), {})
     assert "False" not in capsys.readouterr().out
+
+
+def test_the_table_of_methods_is_the_table():
+    listed = re.findall(r"^\| `(\w+)` \| (.*) \|$", README, re.M)
+    assert listed == [(name, what) for name, (_, _, what) in METHODS.items()]
 
 
 def test_files_that_are_linked_exist():
