@@ -204,7 +204,7 @@ def test_rank_condition_and_symmetry():
     Q[0, 1] += 0.01
     skew = diagnose(InterfaceProblem(Q, np.zeros((3, 2)), 0.5))
     assert skew.asymmetry == pytest.approx(0.01 * np.sqrt(2) / np.linalg.norm(Q))
-    indefinite = diagnose(InterfaceProblem(np.diag([1.0, -0.5]), np.zeros((1, 2)), 0.5))
+    indefinite = diagnose(InterfaceProblem(np.array([[1.0, 1.5], [1.5, 1.0]]), np.zeros((1, 2)), 0.5))
     assert "not positive semidefinite" in str(indefinite)
 
 

@@ -75,6 +75,16 @@ def test_newton_step_solves_the_linearised_equations(p):
         assert np.allclose(np.concatenate([dr.ravel(), dlam]), expected, atol=1e-9)
 
 
+@pytest.mark.parametrize("name", SMALL)
+def test_matrix_free_newton_takes_the_same_steps(name):
+    problem = reduce(make_scene(name, mu=0.3, elements=SMALL[name]))
+    dense, free = solve(problem, "newton", tol=1e-9), solve(problem, "newton", tol=1e-9, linear="gmres")
+    assert free.solved and free.iterations == dense.iterations
+    assert np.allclose(free.reactions, dense.reactions, atol=1e-7)
+    with pytest.raises(InputError, match="choose dense or gmres"):
+        solve(problem, "newton", linear="magic")
+
+
 def test_bonded_system_refuses_what_it_cannot_factorise():
     for Q in (np.array([[1.0, 0.5], [0.0, 1.0]]), np.diag([1.0, -1.0]), np.diag([1.0, 1e-18])):
         with pytest.raises(la.LinAlgError):

@@ -19,6 +19,7 @@ import scipy.linalg as la
 
 from contactopt.bonded import Bonded
 from contactopt.cones import coulomb_map
+from contactopt.errors import InputError
 from contactopt.methods import NATIVE, Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.semismooth import Equations
@@ -28,19 +29,28 @@ LOOSE = 0.5  # share of contacts that do not stick, up to which the bonded facto
 
 @dataclass(frozen=True)
 class Newton:
-    """No settings."""
+    """linear: how the systems are solved, 'dense' or 'gmres', which needs products with Q only."""
+
+    linear: str = "dense"
+
+    def __post_init__(self) -> None:
+        if self.linear not in ("dense", "gmres"):
+            raise InputError(f"unknown linear solver {self.linear!r}; choose dense or gmres.")
 
     def backends(self, dim: int) -> tuple[str, str]:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         equations = coulomb_equations(problem)
-        factor = bonded_factor(problem)
-        r, multipliers = cold_start(problem, factor) if start is None else start
+        factor = bonded_factor(problem) if self.linear == "dense" else None
+        r, multipliers = cold_start(problem, factor, self.linear) if start is None else start
         while True:
             _, error, balance, D = equations.evaluate(r, multipliers)
             yield r + error, multipliers  # P(y): at the solution equal to r, and within the bounds to the last digit
-            step = newton_step(equations, factor, error, balance, D)
+            if self.linear == "gmres":
+                step = equations.krylov_step(error, balance, D)
+            else:
+                step = newton_step(equations, factor, error, balance, D)
             if step is None:
                 return
             r, multipliers = r + step[0], multipliers + step[1]
@@ -82,7 +92,7 @@ def newton_step(
     return equations.step(error, balance, D)
 
 
-def cold_start(problem: InterfaceProblem, factor: Bonded | None = None) -> Iterate:
+def cold_start(problem: InterfaceProblem, factor: Bonded | None = None, linear: str = "dense") -> Iterate:
     """All contacts glued if a plate presses the bodies together, else no force at all."""
     zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
     if len(problem.s) == 0:
@@ -98,4 +108,6 @@ def cold_start(problem: InterfaceProblem, factor: Bonded | None = None) -> Itera
         lambda y: (y, np.broadcast_to(np.eye(y.shape[1]), (*y.shape, y.shape[1]))),
     )
     _, error, balance, D = glue.evaluate(*zero)
+    if linear == "gmres":
+        return glue.krylov_step(error, balance, D) or zero
     return glue.step(error, balance, D, ridge=1e-8) or zero
