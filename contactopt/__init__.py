@@ -40,7 +40,7 @@ _HOMES = {
     "warm": ("transfer",),
     "scene": ("BodyForce", "Material", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
 }
-_MODULES = ("fclib", "plots", "scenes")
+_MODULES = ("fclib", "models", "plots", "scenes")
 __all__ = sorted([*(name for names in _HOMES.values() for name in names), *_MODULES])
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from contactopt.driver import solve
 from contactopt.errors import InputError
-from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.reduction import Reduction, reduce_bodies
 from contactopt.scene import Scene
 from contactopt.warm import transfer
@@ -102,5 +102,5 @@ def solve_zone(
             raise InputError(f"scene '{scene.name}': fewer than two nodes are in contact; take more elements.")
         agreed = abs(width - zones[-1]) <= AGREE * zones[-1] / elements
         zones.append(width)
-        if agreed or not solution.solved or len(zones) > LOOPS:
+        if agreed or solution.status not in (Status.SOLVED, Status.SETTLED) or len(zones) > LOOPS:
             return reduction, solution, zones
