@@ -76,7 +76,7 @@ class Equations:
             return dr.reshape(k, d), np.zeros(p)
         rho = np.repeat(self.rho, d)[rows]
         matrix = np.zeros((n + p, n + p))
-        matrix[:n, :n] = self.Q[np.ix_(rows, rows)]
+        matrix[:n, :n] = self.Q if n == k * d else self.Q[np.ix_(rows, rows)]
         matrix[np.arange(n), np.arange(n)] += self.weight + ridge
         matrix[:n, n:] = self.V[rows]
         matrix[:n] *= rho[:, None]
@@ -85,8 +85,8 @@ class Equations:
         D = D[closed]
         bent = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))  # contacts that slip
         index = (bent[:, None] * d + np.arange(d)).ravel()
-        block = matrix[index]
-        block[np.arange(len(index)), index] -= 1.0
+        matrix[index, index] -= 1.0
+        block = matrix[:n] if len(index) == n else matrix[index]  # all slip: no copy
         matrix[index] = (D[bent] @ block.reshape(len(bent), d, n + p)).reshape(len(index), n + p)
         matrix[index, index] += 1.0
         coupling[index] = (D[bent] @ coupling[index].reshape(len(bent), d, 1)).ravel()
