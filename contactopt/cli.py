@@ -36,7 +36,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--force", type=float, metavar="N", help="total normal force")
     run.add_argument("--elements", type=int, metavar="N", help="elements across the contact half-width")
     run.add_argument("--tol", type=float, default=1e-8, metavar="T", help="bound on the natural-map residual (1e-8)")
-    show = commands.add_parser("list", help="scenes, methods and backends")
+    show = commands.add_parser("list", help="scenes, methods, preconditioners and backends")
     show.set_defaults(command=_list)
     return parser
 
@@ -74,11 +74,16 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _list(options: argparse.Namespace) -> int:
+    from contactopt.preconditioners import PRECONDITIONERS
+
     print("scenes")
     for name, (_, what) in SCENES.items():
         print(f"  {name:12} {what}")
     print("methods")
     for name, (_, _, what) in METHODS.items():
+        print(f"  {name:20} {what}")
+    print("preconditioners of the interface operator")
+    for name, (_, what) in PRECONDITIONERS.items():
         print(f"  {name:20} {what}")
     for title, table in (("QP backends (normal; tangential in 2D)", QP), ("conic backends (tangential in 3D)", CONIC)):
         print(title)

@@ -22,16 +22,14 @@ from typing import Any
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-from scipy.sparse.linalg import SuperLU, splu
-from scipy.spatial import KDTree
+from scipy.sparse.linalg import LinearOperator, SuperLU, splu
 
 from contactopt.body import Body, build_body
 from contactopt.dissection import nested_dissection
-from contactopt.errors import InputError
+from contactopt.interface import match_bodies, positions
 from contactopt.problem import InterfaceProblem
-from contactopt.scene import Part, Rigid, Scene
+from contactopt.scene import Part, Scene
 
-MATCH = 1e-6  # nodes match within this fraction of the shortest distance between contact nodes
 KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body's stiffness is free
 
 
@@ -60,10 +58,13 @@ class ReducedBody:
         """A_ff^-1 load, zero on the prescribed unknowns; load (n,) or (n, j)."""
         return _solve(self.factors, self.order, load)
 
+    def elastic(self, force: np.ndarray) -> np.ndarray:
+        """Displacement (n,) under nodal forces (n,) with the free plates at rest; prescribed unknowns do not move."""
+        return np.asarray(self.solve(force) + self.soft @ (self.soft.T @ force))
+
     def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """Displacement of all unknowns under nodal contact forces (n,) and plate displacements (p,), eq (13)."""
-        elastic = self.solve(force) + self.soft @ (self.soft.T @ force)
-        return np.asarray(self.at_rest + elastic + self.motions @ multipliers)
+        return np.asarray(self.at_rest + self.elastic(force) + self.motions @ multipliers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +85,18 @@ class Reduction:
     frames: np.ndarray
     plates: tuple[int, int]
     seconds: dict[str, float]
+
+    @property
+    def operator(self) -> LinearOperator:
+        """Q as products by body solves, (k dim, k dim): one forward and one backward substitution per body."""
+        size = self.problem.q.size
+        pairs = [(b, n) for b, n in zip(self.bodies, self.nodes) if b is not None]
+        maps = [(b, _local_map(b.body.basis.nodal_dofs[:, n].T, self.frames, len(b.at_rest))) for b, n in pairs]
+
+        def product(r: np.ndarray) -> np.ndarray:
+            return np.sum([T @ body.elastic(T.T @ r.ravel()) for body, T in maps], axis=0)
+
+        return LinearOperator((size, size), matvec=product, rmatvec=product, dtype=float)
 
     @property
     def dofs(self) -> int:
@@ -116,7 +129,7 @@ def reduce_bodies(scene: Scene, elements: int | None = None, zone: float | None 
     start = time.perf_counter()
     parts = (scene.upper, scene.lower)
     bodies = [build_body(scene, part, elements, zone) if isinstance(part, Part) else None for part in parts]
-    nodes, frames, gap, areas = _interface(scene, *bodies)
+    nodes, frames, gap, areas = match_bodies(scene, *bodies)
     seconds["assemble"] = time.perf_counter() - start
 
     start = time.perf_counter()
@@ -147,7 +160,7 @@ def reduce_bodies(scene: Scene, elements: int | None = None, zone: float | None 
         np.concatenate(columns, axis=1),
         np.concatenate(resultants),
         areas,
-        _coordinates(bodies, nodes),
+        positions(bodies, nodes),
         scene.bilateral,
     )
     seconds["compliance"] = time.perf_counter() - start
@@ -238,70 +251,3 @@ def _rigid_motions(rigid: Any, scene: Scene, frames: np.ndarray, sign: float) ->
     columns = [frames[:, :, scene.components.index(name)].reshape(k * scene.dim) for name in force]
     V = sign * np.stack(columns, axis=1) if columns else np.zeros((k * scene.dim, 0))
     return V, np.array(list(force.values()), dtype=float)
-
-
-def _interface(scene: Scene, upper: Body | None, lower: Body | None) -> tuple[Any, ...]:
-    """Matched contact nodes of both bodies, frames, initial gap and areas."""
-    if upper is not None and lower is not None:
-        own, other = _match(upper, lower)
-        nodes = (upper.nodes[own], lower.nodes[other])
-        normals = lower.normals[:, other]
-        gap = np.sum(normals * (upper.points[:, own] - lower.points[:, other]), axis=0)
-        areas = lower.areas[other]
-    else:
-        body, rigid, sign = (upper, scene.lower, -1.0) if upper is not None else (lower, scene.upper, 1.0)
-        assert body is not None and isinstance(rigid, Rigid)
-        own = np.lexsort(body.points)
-        nodes = (body.nodes[own], body.nodes[own])
-        normals = sign * body.normals[:, own]
-        if rigid.normal is not None:
-            normals = np.tile(np.array(rigid.normal)[:, None] / np.linalg.norm(rigid.normal), len(own))
-        areas = body.areas[own]
-        gap = np.zeros(len(own)) if rigid.gap is None else np.asarray(rigid.gap(body.points[:, own]), dtype=float)
-        if gap.shape != (len(own),) or not np.all(np.isfinite(gap)):
-            raise InputError(f"the gap of rigid body '{rigid.name}' must give one finite number per contact node.")
-    return nodes, _frames(normals), gap, areas
-
-
-def _match(upper: Body, lower: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Indices into both bodies' contact nodes such that partners lie on one normal; InputError if they do not."""
-    mean = lower.normals @ lower.areas
-    mean /= np.linalg.norm(mean)
-    first, second = (b.points - np.outer(mean, mean @ b.points) for b in (upper, lower))
-    order = np.lexsort(upper.points)
-    distance, partner = KDTree(second.T).query(first.T[order])
-    spacing = KDTree(second.T).query(second.T, k=2)[0][:, 1].min() if second.shape[1] > 1 else 1.0
-    if len(order) != second.shape[1]:
-        raise InputError(
-            f"interface nodes do not match: body '{upper.name}' has {len(order)} contact nodes, "
-            f"body '{lower.name}' has {second.shape[1]}; give both meshes the same nodes there."
-        )
-    if distance.max() > MATCH * max(spacing, 1e-300) or len(np.unique(partner)) < len(partner):
-        raise InputError(
-            f"interface nodes do not match: a contact node of body '{upper.name}' lies {distance.max():.3g} off "
-            f"the normal through the nearest one of body '{lower.name}' (spacing {spacing:.3g}); "
-            "give both meshes the same nodes there."
-        )
-    return order, partner
-
-
-def _frames(normals: np.ndarray) -> np.ndarray:
-    """Rows n, t1[, t2] per node; t1 is the first axis made orthogonal to n (in 2D: n turned clockwise)."""
-    dim, k = normals.shape
-    frames = np.zeros((k, dim, dim))
-    frames[:, 0] = normals.T
-    if dim == 2:
-        frames[:, 1] = np.stack([normals[1], -normals[0]], axis=1)
-        return frames
-    steep = np.abs(normals[0]) > 0.9  # the first axis is nearly normal there: use the second
-    axis = np.where(steep[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
-    t1 = axis - np.sum(axis * normals.T, axis=1)[:, None] * normals.T
-    frames[:, 1] = t1 / np.linalg.norm(t1, axis=1)[:, None]
-    frames[:, 2] = np.cross(frames[:, 0], frames[:, 1])
-    return frames
-
-
-def _coordinates(bodies: list[Body | None], nodes: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    body, own = (bodies[1], nodes[1]) if bodies[1] is not None else (bodies[0], nodes[0])
-    assert body is not None
-    return np.asarray(body.basis.mesh.p[:, own])

@@ -54,6 +54,15 @@ def test_compliance_is_the_trailing_block_of_the_inverse(kind):
         assert np.abs(body.compliance - expected).max() < 1e-12 * np.abs(expected).max()
 
 
+@pytest.mark.parametrize(
+    "scene", [*map(two_blocks, KINDS), scenes.flat_punch(3, elements=3), scenes.sphere(elements=6, rigid="sphere")]
+)
+def test_products_by_body_solves_are_those_of_the_explicit_operator(scene):
+    reduction = reduce_bodies(scene)
+    Q = reduction.problem.Q
+    assert np.abs(reduction.operator @ np.eye(len(Q)) - Q).max() < 1e-11 * np.abs(Q).max()
+
+
 def test_schur_complement_is_the_inverse_of_the_compliance():
     """Eq (13): S = A_cc - A_ci A_ii^-1 A_ic."""
     body = reduce_bodies(scenes.flat_punch(2, elements=6)).bodies[1]
