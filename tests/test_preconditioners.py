@@ -3,7 +3,7 @@ import pytest
 import scipy.linalg as la
 from scipy.sparse.linalg import cg
 
-from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Support, reduce, scenes
+from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Support, reduce
 from contactopt.mesh import graded, rename, tensor_mesh
 from contactopt.preconditioners import (
     PRECONDITIONERS,
@@ -94,10 +94,10 @@ def test_circulants_are_those_of_the_paper(m):
 def test_products_are_those_of_the_dense_matrices(k):
     m = int(2 ** np.ceil(np.log2(k)))
     dense = la.circulant(seminorm(m))[:k, :k]
-    assert np.allclose(p21(k)(np.eye(k)), dense, atol=1e-13)
+    assert np.allclose(p21((k,))(np.eye(k)), dense, atol=1e-13)
     symbol = np.fft.fft(seminorm(m)).real / np.fft.fft(norm(m, 4 / (k - 1))).real
     inner = la.circulant(np.fft.ifft(symbol).real)[:k, :k]
-    assert np.allclose(p22(k)(np.eye(k)) @ inner, np.eye(k), atol=1e-9)
+    assert np.allclose(p22((k,))(np.eye(k)) @ inner, np.eye(k), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", PRECONDITIONERS)
@@ -124,6 +124,37 @@ def test_bad_input():
     with pytest.raises(InputError, match="unknown preconditioner 'ilu'; choose from p21, p22, neumann"):
         preconditioner(two_blocks(17), "ilu")
     uneven = InterfaceProblem(np.eye(8), np.zeros((4, 2)), 0.1, coordinates=np.array([[0.0, 1.0, 2.0, 4.0]]))
-    for problem in (uneven, reduce(scenes.flat_punch(3, elements=2))):
+    ragged = InterfaceProblem(
+        np.eye(9), np.zeros((3, 3)), 0.1, coordinates=np.array([[0.0, 1, 2], [0, 1, 3], [0, 0, 0]])
+    )
+    for problem in (uneven, ragged):
         with pytest.raises(InputError, match="evenly spaced"):
             preconditioner(problem, "p21")
+    with pytest.raises(InputError, match="choose p21 or neumann"):
+        preconditioner(solid_blocks(5), "p22")
+
+
+def solid_blocks(n: int) -> InterfaceProblem:
+    """The same bodies in 3D, the punch held on top in every direction; n x n nodes on the contact surface."""
+    h, zone = 4 / (n - 1), np.linspace(-2, 2, n)
+    out = 2 + graded(6, 1.3 * h, 1.3)[1:]
+    across = np.concatenate([-out[::-1], zone, out])
+    punch = rename(tensor_mesh(zone, zone, graded(4, h, 1.3)), contact="z-", top="z+")
+    ground = rename(tensor_mesh(across, across, -graded(8, h, 1.3)[::-1]), bottom="z-").with_boundaries(
+        {"contact": lambda x: (x[2] > -1e-9) & (np.abs(x[0]) < 2) & (np.abs(x[1]) < 2)}
+    )
+    rubber = Material(5.0, 0.3)
+    bodies = (Part("punch", punch, rubber, (Support("top"),)), Part("ground", ground, rubber, (Support("bottom"),)))
+    return reduce(Scene("solid", *bodies, 0.5, kind="solid"))
+
+
+@pytest.mark.parametrize("n", [5, 9])
+def test_in_3d(n):
+    problem = solid_blocks(n)
+    size = problem.q.size
+    first, second = (preconditioner(problem, name) for name in ("p21", "neumann"))
+    for P in (first @ np.eye(size), second @ np.eye(size)):
+        assert np.allclose(P, P.T, atol=1e-9 * np.abs(P).max())
+    bare = np.linalg.cond(problem.Q)
+    assert condition(first @ np.eye(size), problem.Q) < 0.6 * bare
+    assert condition(deflated(second, problem.Q, smooth_motions(problem)), problem.Q) < 6
