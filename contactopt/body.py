@@ -151,7 +151,7 @@ def _pairs(f: np.ndarray, measure: np.ndarray) -> np.ndarray:
 
 
 def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
-    if mesh.p.shape[0] != scene.dim or mesh.refdom.__name__ not in ELEMENTS:
+    if not isinstance(mesh, skfem.Mesh) or mesh.p.shape[0] != scene.dim or mesh.refdom.__name__ not in ELEMENTS:
         raise InputError(
             f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension {scene.dim} made of "
             f"triangles, quadrilaterals, tetrahedra or hexahedra; got {type(mesh).__name__}."

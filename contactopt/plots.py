@@ -13,7 +13,6 @@ from contactopt.scene import Scene
 from contactopt.zone import contact_area, contact_half_width, pressed, stuck
 
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
-LENGTH, STRESS = "mm", "MPa"  # the named scenes' units
 
 
 def _axes(ax: Any, **options: Any) -> Any:
@@ -60,11 +59,11 @@ def _draw_section(scene: Scene, fields: Sequence[Fields], scale: float, top: flo
             outline = outline[:, ~np.all(np.isclose(f.mesh.p[0][outline], 0.0), axis=0)] if mirror else outline
             ax.plot(mirror * points[0][outline], points[1][outline], color="black", lw=0.6)
     across, up = scene.components
-    ax.set(xlabel=f"{across} [{LENGTH}]", ylabel=f"{up} [{LENGTH}]", aspect="equal")
+    ax.set(xlabel=f"{across} [{scene.units[0]}]", ylabel=f"{up} [{scene.units[0]}]", aspect="equal")
     if scene.zone is not None:  # a small contact on large bodies: show where it happens
         reach = 4 * (scene.reference.half_width if scene.reference else scene.zone)
         ax.set(xlim=(-reach, reach), ylim=(-0.9 * reach, 0.6 * reach))
-    ax.figure.colorbar(colours, ax=ax, label=f"von Mises stress [{STRESS}]", extend="max", shrink=0.8)
+    ax.figure.colorbar(colours, ax=ax, label=f"von Mises stress [{scene.units[1]}]", extend="max", shrink=0.8)
     return ax
 
 
@@ -92,8 +91,8 @@ def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low)
     ax.view_init(elev=22, azim=-130)
-    ax.set(xlabel=f"x [{LENGTH}]", ylabel=f"y [{LENGTH}]", zlabel=f"z [{LENGTH}]")
-    ax.figure.colorbar(shade, ax=ax, label=f"von Mises stress [{STRESS}]", extend="max", shrink=0.7, pad=0.12)
+    ax.set(xlabel=f"x [{scene.units[0]}]", ylabel=f"y [{scene.units[0]}]", zlabel=f"z [{scene.units[0]}]")
+    ax.figure.colorbar(shade, ax=ax, label=f"von Mises stress [{scene.units[1]}]", extend="max", shrink=0.7, pad=0.12)
     return ax
 
 
@@ -143,8 +142,8 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     across = scene.components[0]
     where = ", y = 0" if problem.dim == 3 else ""
     ax.set(
-        xlabel=f"{across} / a [-]{where}, a = {a:.4g} {LENGTH}",
-        ylabel=f"p / mean p [-], mean p = {mean:.4g} {STRESS}",
+        xlabel=f"{across} / a [-]{where}, a = {a:.4g} {scene.units[0]}",
+        ylabel=f"p / mean p [-], mean p = {mean:.4g} {scene.units[1]}",
         ylim=(0, 1.15 * float((p / mean).max() or 1.0)),
     )
     ax.legend(frameon=False)
@@ -168,7 +167,9 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     ax.plot(x[slipping], t[slipping], "s", color=ORANGE, ms=5, mfc="white", label="slip")
     across = scene.components[0]
     where = ", y = 0" if problem.dim == 3 else ""
-    ax.set(xlabel=f"{across} [{LENGTH}]{where}", ylabel=f"tangential traction on the upper body [{STRESS}]")
+    ax.set(
+        xlabel=f"{across} [{scene.units[0]}]{where}", ylabel=f"tangential traction on the upper body [{scene.units[1]}]"
+    )
     ax.legend(frameon=False)
     return ax
 
@@ -189,7 +190,12 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
     t = solution.reactions[:, 1:] / problem.areas[:, None]
     if np.any(t):
         ax.quiver(x, y, t[:, 0], t[:, 1], color="black", width=0.003)
-    ax.set(xlabel=f"x [{LENGTH}]", ylabel=f"y [{LENGTH}]", aspect="equal", title="arrows: tangential traction")
+    ax.set(
+        xlabel=f"x [{scene.units[0]}]",
+        ylabel=f"y [{scene.units[0]}]",
+        aspect="equal",
+        title="arrows: tangential traction",
+    )
     ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
     return ax
 

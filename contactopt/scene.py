@@ -103,6 +103,10 @@ class Part:
     loads: tuple[Traction | BodyForce | Plate, ...] = ()
     contact: str = "contact"
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.material, Material):
+            raise InputError(f"body '{self.name}': its material must be a Material(E, nu); got {self.material!r}.")
+
     def build_mesh(self, elements: int, zone: float | None) -> Any:
         return self.mesh(elements, zone) if callable(self.mesh) else self.mesh
 
@@ -137,6 +141,7 @@ class Scene:
     bilateral  no separation: the normal displacement always equals the initial gap, the friction bound is mu |r_n|.
     elements   default number of elements across the contact half-width, for parts whose mesh is a function.
     zone       first guess of the contact half-width [length]; None when the geometry fixes the contact zone.
+    units      names of the units of length and stress, for the axes of figures
     reference  an exact solution to compare with (contactopt.analytic.Reference), or None.
     """
 
@@ -150,6 +155,7 @@ class Scene:
     bilateral: bool = False
     elements: int = 16
     zone: float | None = None
+    units: tuple[str, str] = ("length", "stress")
     reference: Any = field(default=None, compare=False)
 
     def __post_init__(self) -> None:

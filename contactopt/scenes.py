@@ -16,6 +16,7 @@ from contactopt.errors import InputError
 from contactopt.scene import Material, Part, Plate, Rigid, Scene, Support, check_number
 
 RUBBER = Material(E=5.0, nu=0.3)  # MPa, the material of all the paper's bodies
+UNITS = ("mm", "MPa")
 GROWTH = {2: 1.2, 3: 1.3}  # ratio of neighbouring elements away from the contact, by dimension
 MARGIN = 1.25  # candidate contact zone of the sphere, over the half-width its mesh resolves
 
@@ -93,6 +94,7 @@ def flat_punch(
         copies=2 ** (dim - 1),
         bilateral=bilateral,
         elements=elements,
+        units=UNITS,
         reference=flat_punch_line(force / depth, a) if dim == 2 and rigid == "punch" else None,
     )
 
@@ -176,6 +178,7 @@ def sphere(
         bilateral=bilateral,
         elements=elements,
         zone=MARGIN * hertz.half_width,
+        units=UNITS,
         reference=hertz,
     )
 

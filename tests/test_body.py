@@ -120,6 +120,8 @@ def test_a_rotation_about_one_held_node_is_found():
         (dict(contact="face"), "no boundary named 'face'.*bottom"),
         (dict(supports=(Support("floor"),)), "no boundary named 'floor'"),
         (dict(mesh=skfem.MeshTet()), "dimension 2"),
+        (dict(mesh="block.msh"), "scikit-fem mesh of dimension 2.*got str"),
+        (dict(material=5.0), "material must be a Material"),
         (dict(loads=(Plate("bottom", {"y": -1.0}),)), "plate .* moves in y, but a support"),
         (dict(supports=(Support("bottom"), Support("bottom", {"y": 1.0}))), "different value"),
     ],

@@ -15,6 +15,13 @@ def test_every_axis_is_labelled_with_its_unit(name, elements):
             assert "[" in label and "]" in label
 
 
+def test_a_users_scene_is_not_labelled_with_our_units():
+    result = run(two_blocks("plane-strain", mu=0.3))
+    labels = [plots.traction(result.scene, result.problem, result.solution).get_ylabel()]
+    labels.append(plots.deformed(result.scene, result.problem, result.fields).get_xlabel())
+    assert not any("mm" in label or "MPa" in label for label in labels)
+
+
 def test_the_pressure_curve_is_the_pressure():
     result = run("sphere", elements=8)
     line = plots.pressure(result.scene, result.problem, result.solution).lines[0]
