@@ -145,7 +145,7 @@ def box_qp(
     tol: float = 1e-10,
     max_iterations: int = 10_000,
 ) -> BoxResult:
-    """The same problem as `mprgp`, in about half its time where P does not fit the processor's cache.
+    """The same problem as `mprgp`, in less time where P does not fit the processor's cache (reports/dense_speed).
 
     Iterative refinement: the correction d of x minimises d'Pd/2 + (P x + c)'d, d >= low - x, in single precision to a
     few digits, scaled so that no digit is lost; its gradient is taken anew in double precision. Ends in double

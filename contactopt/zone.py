@@ -78,8 +78,7 @@ def solve_zone(
     Each round solves on meshes with a node at the present zone's edge and reads the new edge from the reactions; two
     zones agree when they differ by a twentieth of an element. Returns the last reduction and solution with the zones
     tried, the last of them the result, none if there is no loop; `seconds` are summed over the rounds, each of which starts
-    from the one before. settings go to
-    solve().
+    from the one before. settings go to solve().
     """
     elements = scene.elements if elements is None else elements
     seconds: Counter[str] = Counter()

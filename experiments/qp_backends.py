@@ -35,12 +35,18 @@ def measure(name: str, exact, problem) -> dict[str, object]:  # type: ignore[no-
 
 
 def without_crossover(name: str, problem):  # type: ignore[no-untyped-def]
-    saved = alternating.crossover
-    alternating.crossover = lambda Q, c, V, s, project, r, multipliers: (r, multipliers)
+    saved = alternating.certified
+    alternating.certified = as_it_comes
     try:
         return solve(problem, "alternating", normal=name, tangential=name, tol=1e-9, max_iterations=40)
     finally:
-        alternating.crossover = saved
+        alternating.certified = saved
+
+
+def as_it_comes(solvers, equations):  # type: ignore[no-untyped-def]
+    """The first answer of the first try, in place of contactopt.semismooth.certified."""
+    r, multipliers = next(iter(solvers))[1]()
+    return r.reshape(equations.q.shape), multipliers
 
 
 def in_all_units(name: str) -> dict[str, object]:

@@ -66,7 +66,7 @@ def draw(rows: list[dict]) -> Figure:
     ax = figure.subplots()
     left = [0.0] * len(rows)
     for phase, colour in zip((*PHASES, "start, imports"), COLOURS):
-        share = [row[phase] / row["wall [s]"] for row in rows]
+        share = [row[phase] / sum(row[p] for p in (*PHASES, "start, imports")) for row in rows]
         ax.barh([f"{row['scene']}, {row['method']}" for row in rows], share, left=left, color=colour, label=phase)
         left = [a + b for a, b in zip(left, share)]
     ax.set(xlabel="share of the wall time [-]", xlim=(0, 1))

@@ -39,4 +39,4 @@ def test_hertz_line_satisfies_the_half_plane_equation():
     a = line.half_width
     for x in (0.2 * a, 0.7 * a):
         slope = -2 / (np.pi * modulus) * quad(lambda s: -line.pressure(np.array(s)), -a, a, weight="cauchy", wvar=x)[0]
-        assert slope == pytest.approx(-x / radius, rel=1e-6) or slope == pytest.approx(x / radius, rel=1e-6)
+        assert slope == pytest.approx(-x / radius, rel=1e-6)

@@ -17,26 +17,9 @@ from contactopt.methods.newton import coulomb_equations
 from contactopt.problem import dimensionless
 from contactopt.scenes import make_scene
 from contactopt.semismooth import Equations
+from experiments.robustness import rigid_bodies
 
 SMALL = {"punch-2d": 16, "punch-3d": 5, "sphere": 12}
-
-
-def rigid_bodies(seed: int, bodies: int = 6, contacts: int = 14, mu: float = 0.7) -> InterfaceProblem:
-    """Random rigid bodies with more contact unknowns than degrees of freedom: Q = H' M^-1 H has a kernel.
-
-    q = H' v comes from velocities, so that a solution exists.
-    """
-    rng = np.random.default_rng(seed)
-    H = np.zeros((3 * contacts, 6 * bodies))
-    for c in range(contacts):
-        frame = la.qr(rng.normal(size=(3, 3)))[0]
-        i, j = rng.choice(bodies, 2, replace=False)
-        for body, sign in ((i, 1.0), (j, -1.0)):
-            arm = rng.normal(size=3)
-            H[3 * c : 3 * c + 3, 6 * body : 6 * body + 3] = sign * frame
-            H[3 * c : 3 * c + 3, 6 * body + 3 : 6 * body + 6] = sign * np.cross(arm, frame)
-    inverse_mass = 10 ** rng.uniform(-1, 1, 6 * bodies)
-    return InterfaceProblem((H * inverse_mass) @ H.T, (H @ rng.normal(size=6 * bodies)).reshape(-1, 3), mu)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -109,7 +92,7 @@ def test_small_problems_on_which_fixed_points_fail():
 
 @pytest.mark.parametrize("seed", range(12))
 def test_rank_deficient_problems_are_certified(seed):
-    problem = rigid_bodies(seed)
+    problem = rigid_bodies(seed, 6, 14, 0.7)
     assert np.linalg.matrix_rank(problem.Q) < len(problem.Q)
     for method in ("auto", "proximal"):
         assert solve(problem, method).solved
@@ -117,7 +100,7 @@ def test_rank_deficient_problems_are_certified(seed):
 
 def test_proximal_finds_what_newton_misses():
     """Newton's method runs in circles on some of these; the chain of the default does not."""
-    problems = [rigid_bodies(seed, bodies=10, contacts=40) for seed in range(6)]
+    problems = [rigid_bodies(seed, 10, 40, 0.7) for seed in range(6)]
     newton = [solve(problem, "newton", max_iterations=50).solved for problem in problems]
     assert not all(newton) and all(solve(problem).solved for problem in problems)
 
@@ -208,7 +191,7 @@ def test_load_scales_the_answer_where_there_is_no_gap(factor):
 
 def test_auto_leaves_newton_when_it_cycles(monkeypatch):
     """The chain: a Newton method that repeats itself is given up after PATIENCE steps."""
-    problem, _ = dimensionless(rigid_bodies(1))
+    problem, _ = dimensionless(rigid_bodies(1, 6, 14, 0.7))
     wrong = np.ones(problem.q.shape)
     monkeypatch.setattr(
         "contactopt.methods.newton.Newton.iterate", lambda self, p, s=None: iter([(wrong, np.zeros(0))] * 50)

@@ -3,8 +3,8 @@
     min  r'Qr/2 + (q + g n)' r    subject to  V'r + s = 0,  r = z,  |z_t| <= mu z_n,    g_i = mu_i |u_t,i|:
 r from one linear system with Q + rho I and the balance rows, z by projection, the scaled multiplier x of r = z by
 their difference; -rho x is the velocity u + g n, which renews g in every iteration. For fixed g this converges for
-every rho; with g renewed there is no proof, and in practice it converges for rank-deficient Q and strong friction
-alike, linearly. Bilateral contact: r_n is free and the discs have the radius mu |r_n|. Cost: one factorisation of Q +
+every rho; with g renewed there is no proof, it needs no full rank of Q, but
+strong friction may defeat it (reports/robustness). Bilateral contact: r_n is free and the discs have the radius mu |r_n|. Cost: one factorisation of Q +
 rho I, 2 n^3/3 operations (LU, since a Q from a file need not be quite symmetric), and n^2 per iteration. rho is
 balanced after 10, 20, 40, ... iterations where that is worth a factorisation, so that the errors of r = z and of the
 velocity fall together.

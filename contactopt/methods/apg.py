@@ -5,10 +5,8 @@ solve
     min  r'Qr/2 + (q + g n)' r    subject to  |r_t| <= mu r_n,  V'r + s = 0,
 a convex program over Coulomb's cones; g is renewed from its answer (the outer iteration that is yielded). For
 bilateral contact the bound mu |r_n| is held instead and r_n is free. An inner iteration costs one product with Q
-(Nesterov's step 1 / largest eigenvalue, restarted where the momentum points uphill), an outer one ten to a few hundred
-of them. The inner iteration always converges, in a number of steps like the square root of Q's condition number, and
-for singular Q more slowly; the fixed point has no proof of convergence, but seldom fails, also where `alternating`
-cycles.
+(Nesterov's step 1 / largest eigenvalue, restarted where the momentum points uphill), an outer one many of them. The inner iteration always converges, in a number of steps like the square root of Q's condition number, and
+for singular Q more slowly; the fixed point has no proof of convergence.
 Sources: O'Donoghue, Candes (2015), Adaptive restart; Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the
 linear discrete Coulomb friction problem via convex optimization.
 """

@@ -1,9 +1,8 @@
 """The default, without a number to choose: Newton's method, and where it fails cones, then the proximal loop.
 
-1. Newton's method from the bonded solution (or no force at all) while its residual falls: elastic bodies end here, after
-   1 to 11 steps of one dense linear system each.
+1. Newton's method from the bonded solution (or no force at all) while its residual falls: elastic bodies end here
+   (reports/newton_steps), each step one dense linear system.
 2. CONES iterations of the Acary-Cadoux fixed point: convex programs, which no cycle and no rank deficiency of Q disturbs.
-   Most problems of rigid bodies end here.
 3. The proximal loop from there, which needs no symmetric Q and no backend.
 4. When ROUND outer iterations have not halved the residual, the loop starts again from contact forces drawn at random
    (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong friction may have solutions that

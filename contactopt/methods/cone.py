@@ -8,7 +8,7 @@ problems without slip right; where contacts slip, forces and approach are off by
 `AcaryCadoux` repeats it with s = |u_t| of the last answer, which takes the opening back; a fixed point is exactly a
 solution of Coulomb's problem. Each outer iteration costs one SOCP, whose matrices are handed over once; the answer is
 made exact by Newton steps on r = P(r - u), P the projection on the cones. Converges linearly where mu times the
-coupling of slip and dilatancy is small, on elastic bodies usually in 4 to 12 iterations; there is no proof. Where Q
+coupling of slip and dilatancy is small; there is no proof. Where Q
 is badly rank-deficient the Newton steps may fail, and the certificate stays at what the backend's accuracy gives.
 The SOCP has an answer unless loads pull the bodies apart or friction cannot hold a plate that is dragged.
 Source: Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb friction problem via

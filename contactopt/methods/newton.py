@@ -2,8 +2,8 @@
 
 Solves r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 with P the Coulomb map (contactopt.cones.coulomb_map): each step
 sorts the contacts into open, sticking and slipping and solves one linear system of the closed ones, dense, n^3/3 to
-2 n^3/3 operations. Full steps from the bonded solution; converges in 2 to 10 steps on elastic bodies, almost
-independently of the mesh. Not globally convergent: rank-deficient Q (rigid bodies, redundant contacts) or strong
+2 n^3/3 operations. Full steps from the bonded solution; the number of steps hardly depends on the mesh
+(reports/newton_steps). Not globally convergent: rank-deficient Q (rigid bodies, redundant contacts) or strong
 friction may make it cycle, which is what `proximal` is for.
 Sources: Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm for
 three-dimensional contact problems with Coulomb friction.

@@ -1,10 +1,10 @@
 """Proximal-point loop around the semismooth Newton method: robust where Q has no full rank.
 
 Outer iterate r_j solves Coulomb's problem with u = Q r + V lambda + q + alpha (r - r_{j-1}), a problem whose compliance
-Q + alpha I has full rank, by Newton steps from r_{j-1} (usually one or two). alpha falls by 4 after a success and rises
+Q + alpha I has full rank, by Newton steps from r_{j-1}. alpha falls by 4 after a success and rises
 by 8 after a failure, so that the loop ends as Newton's method where that converges. The fixed points are exactly the
-solutions of Coulomb's problem; there is no proof of convergence for Coulomb friction, but it is the one method that
-certified every FCLib problem tried by its authors. Cost: one dense linear system per Newton step.
+solutions of Coulomb's problem; there is no proof of convergence for Coulomb friction. Cost: one dense linear system per
+Newton step.
 Source: Acary, Bremond, Huber (2018), section on proximal-point algorithms; Rockafellar (1976). The multiplier form of
 the same loop is the augmented Lagrangian method with penalty 1 / alpha.
 """
