@@ -6,7 +6,7 @@ kind (thickness, 2 pi r, mirror images), so that forces and areas are those of t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -111,6 +111,14 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> B
         areas,
         normals,
     )
+
+
+def reload_body(body: Body, scene: Scene, part: Part) -> Body:
+    """The same body under the load values of another scene; InputError if other unknowns are held or driven there."""
+    lift, held, motion, thrust = _constraints(scene, part, body.basis)
+    if not np.array_equal(np.flatnonzero(~held), body.free) or not np.array_equal(motion, body.motion):
+        raise InputError(f"body '{part.name}': supports or plates hold other unknowns than before; reduce it anew.")
+    return replace(body, load=_load(part, body.basis, body.weight), lift=lift, thrust=thrust)
 
 
 def stiffness(basis: skfem.CellBasis, material: Material, weight: tuple[float, bool]) -> sp.csr_matrix:

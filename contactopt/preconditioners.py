@@ -6,27 +6,66 @@ nodes, is a circulant matrix Q_c (27), the H^1 norm another, L_c (28); with m th
 up to a factor that no iteration sees. P21 resembles S1 + S2; the matrix that P22 inverts resembles Q itself. In 3D
 the sum of P21 along both directions of the contact surface is P31 (29). Extension by zero belongs to functions that
 vanish at the ends (H00^1/2), which a traction at a free edge does not:
-    `neumann`, the square root of the Neumann Laplacian of the contact line or surface by the cosine transform,
+    `neumann`, the square root of the Laplacian of the contact line or surface by cosine transforms (sine transforms for
+    components that a plane of symmetry or an axis holds at that end),
 needs no extension. Each acts on every component by itself. What is left are a few smooth motions of the two bodies against
 each other, first of all the sway of a slender body: `deflated` solves for them exactly (balancing, Mandel 1993).
-All need contact nodes that are evenly spaced on a line or a rectangle.
+
+Restriction to an active set A: the paper takes the rows and columns A of P. Where P = G^-1 with a cheap product G, which
+`neumann` has, deflated or not, G_AA is the better model: c1 G <= Q <= c2 G holds on every subspace with the same constants,
+so that (G_AA)^-1, by an inner PCG that needs no body, has the condition number of P on any active set (`restricted`).
+
+Contacts lie on a line or on the points of a rectangular grid. Spacing may vary: in terms of nodal forces the kernel of Q is
+log |x_i - x_j| on a line, a function of the node numbers up to smooth terms, and 1 / |x_i - x_j| on a surface, where the
+fourth root of the nodal area on both sides takes the change of scale out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import dctn, idctn, irfft, rfft
+from scipy.fft import dct, dst, idct, idst, irfft, rfft
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt.errors import InputError
-from contactopt.problem import NOISE, InterfaceProblem
+from contactopt.operators import Interface, diagonal, held, nodal_weights
+from contactopt.problem import InterfaceProblem
 
-Grid = tuple[int, ...]  # contacts along the line, or along both sides of the rectangle
-Product = Callable[[np.ndarray], np.ndarray]  # acts on arrays (*grid, j)
+Product = Callable[[np.ndarray], np.ndarray]  # acts on arrays (*shape, dim)
 
 INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
+ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an active set
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Contacts on a line or a rectangular grid.
+
+    shape    contacts along each direction
+    aspect   mean spacing along the second direction over that along the first; 1 on a line
+    held     (dim, directions, 2): component does not move at the first / last contact of that direction
+    """
+
+    shape: tuple[int, ...]
+    aspect: float
+    held: np.ndarray
+
+
+class Preconditioner(LinearOperator):
+    """P (n, n), an approximate inverse of Q; model: G = P^-1 by cheap products, None where there is no such thing."""
+
+    def __init__(self, n: int, product: Product, model: Product | None = None):
+        super().__init__(np.dtype(float), (n, n))
+        self.product = product
+        self.model = None if model is None else LinearOperator((n, n), matvec=model, rmatvec=model, dtype=float)
+
+    def _matvec(self, x: np.ndarray) -> np.ndarray:
+        return np.asarray(self.product(x.ravel()))
+
+    def _rmatvec(self, x: np.ndarray) -> np.ndarray:
+        return self._matvec(x)
 
 
 def seminorm(m: int) -> np.ndarray:
@@ -50,89 +89,136 @@ def norm(m: int, h: float) -> np.ndarray:
     return column
 
 
-def p21(grid: Grid) -> Product:
+def p21(grid: Grid) -> tuple[Product, None]:
     """Eq (25): E' Q_c E on a line; on a rectangle the sum of it along both directions, P31, eq (29)."""
-    lines = [_restricted(rfft(seminorm(_curve(k))).real, k, axis) for axis, k in enumerate(grid)]
-    return lambda X: np.sum([line(X) for line in lines], axis=0)
+    lines = [_restricted(rfft(seminorm(_curve(k))).real, k, axis) for axis, k in enumerate(grid.shape)]
+    return lambda X: np.sum([line(X) for line in lines], axis=0), None
 
 
-def p22(grid: Grid) -> Product:
+def p22(grid: Grid) -> tuple[Product, Product]:
     """Eq (26): (E' L_c^-1 Q_c E)^-1, a Toeplitz system solved by conjugate gradients; on a line only.
 
     h is the spacing over a quarter of the contact line's length, so that units do not matter.
     """
-    if len(grid) > 1:
+    if len(grid.shape) > 1:
         raise InputError("preconditioner 'p22' is for contact lines (2D); in 3D choose p21 or neumann.")
-    (k,) = grid
+    (k,) = grid.shape
     m = _curve(k)
     symbol = rfft(seminorm(m)).real / rfft(norm(m, 4 / (k - 1))).real
-    product, guess = _restricted(symbol, k, 0), p21(grid)
+    product, guess = _restricted(symbol, k, 0), p21(grid)[0]
     toeplitz = LinearOperator((k, k), matvec=lambda x: product(x.reshape(k, 1))[:, 0], dtype=float)
     near = LinearOperator((k, k), matvec=lambda x: guess(x.reshape(k, 1))[:, 0], dtype=float)
 
     def solve(X: np.ndarray) -> np.ndarray:
         return np.stack([cg(toeplitz, x, rtol=INNER, maxiter=500, M=near)[0] for x in X.T], axis=1)
 
-    return solve
+    return solve, product
 
 
-def neumann(grid: Grid) -> Product:
-    """Square root of the Neumann Laplacian of the cells; its zero, the constants, is half the smallest other one."""
-    squares = np.zeros(grid)
-    for axis, k in enumerate(grid):
-        along = 4 * np.sin(np.pi * np.arange(k) / (2 * k)) ** 2
-        squares += along.reshape([-1 if i == axis else 1 for i in range(len(grid))])
-    root, axes = np.sqrt(squares)[..., None], tuple(range(len(grid)))
-    root[(0,) * len(grid)] = np.sort(root.ravel())[1] / 2
-    return lambda X: idctn(root * dctn(X, axes=axes, norm="ortho"), axes=axes, norm="ortho")
+def neumann(grid: Grid) -> tuple[Product, Product]:
+    """Square root of the Laplacian of the cells, even at free ends, odd at ends where a component is held.
+
+    Its zero, the constants, is half the smallest other value.
+    """
+    parts = [_root(grid, held) for held in grid.held]
+
+    def along(power: float) -> Product:
+        def product(X: np.ndarray) -> np.ndarray:
+            out = np.empty(X.shape)
+            for i, (root, transforms) in enumerate(parts):
+                x = X[..., i]
+                for axis, (forward, _, kind) in enumerate(transforms):
+                    x = forward(x, type=kind, axis=axis, norm="ortho")
+                x = root**power * x
+                for axis, (_, backward, kind) in enumerate(transforms):
+                    x = backward(x, type=kind, axis=axis, norm="ortho")
+                out[..., i] = x
+            return out
+
+        return product
+
+    return along(1.0), along(-1.0)
 
 
-# name -> (function of the grid of contacts, what it is)
-PRECONDITIONERS: dict[str, tuple[Callable[[Grid], Product], str]] = {
+# held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j + shift) / k
+TRANSFORMS = {
+    (False, False): (dct, idct, 2, 0.0),
+    (True, False): (dst, idst, 4, 0.5),
+    (False, True): (dct, idct, 4, 0.5),
+    (True, True): (dst, idst, 2, 1.0),
+}
+
+
+def _root(grid: Grid, held: np.ndarray) -> tuple[np.ndarray, list]:
+    """Square root of the symbol, and the transform along each direction, of a component held as given."""
+    chosen = [TRANSFORMS[bool(first), bool(last)] for first, last in held]
+    squares = np.zeros(grid.shape)
+    for axis, (k, (*_, shift)) in enumerate(zip(grid.shape, chosen)):
+        line = 4 * np.sin(np.pi * (np.arange(k) + shift) / (2 * k)) ** 2
+        squares += (line * grid.aspect ** (1 - 2 * axis)).reshape([-1 if i == axis else 1 for i in range(squares.ndim)])
+    root = np.sqrt(squares)
+    if root.flat[0] == 0:
+        root.flat[0] = np.sort(root.ravel())[1] / 2
+    return root, [transform[:3] for transform in chosen]
+
+
+# name -> (function of the grid of contacts giving P and, where it is cheap, P^-1, what it is)
+PRECONDITIONERS: dict[str, tuple[Callable[[Grid], tuple[Product, Product | None]], str]] = {
     "p21": (p21, "circulant H^1/2 seminorm, extended by zero (paper, eqs (25) and, in 3D, (29))"),
     "p22": (p22, "inverse of the circulant H^-1/2 form, extended by zero (paper, eq (26)), 2D"),
     "neumann": (neumann, "square root of the Neumann Laplacian, by the cosine transform"),
 }
 
 
-def preconditioner(problem: InterfaceProblem, name: str) -> LinearOperator:
-    """The named approximate inverse of problem.Q, (k dim, k dim), the same for every component.
+def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
+    """The named approximate inverse of problem.Q, (k dim, k dim).
 
-    In 3D `neumann` is scaled on both sides by the fourth root of the inverse diagonal of Q: nodes at the edge of the contact
-    are softer (with and without: reports/preconditioner_conditions).
-    Raises InputError for an unknown name, fewer than 3 contacts a side, or nodes not evenly spaced on a line or rectangle.
+    `neumann` is weighted by nodal_weights. Uses of Q only its mean diagonal and which components cannot move.
+    Raises InputError for an unknown name, fewer than 3 contacts a side, or contacts not on a line or rectangular grid.
     """
     if name not in PRECONDITIONERS:
         raise InputError(f"unknown preconditioner {name!r}; choose from {', '.join(PRECONDITIONERS)}.")
-    grid, order = _grid(problem)
-    product = PRECONDITIONERS[name][0](grid)
-    diagonal = np.diag(problem.Q).reshape(problem.q.shape)
-    mean = float(np.mean(diagonal))
-    diagonal = np.where(diagonal > NOISE * mean, diagonal, mean)  # a component that cannot move
-    weight = (mean / diagonal) ** 0.25 if name == "neumann" and problem.dim == 3 else np.ones_like(diagonal)
+    still = held(problem.Q)
+    mean = float(np.mean(diagonal(problem.Q)[~still])) if not still.all() else 1.0
+    grid, order = _grid(problem, still.reshape(problem.q.shape))
+    product, inverse = PRECONDITIONERS[name][0](grid)
+    weight = np.ones((problem.contacts, 1))
+    if name == "neumann":
+        weight = nodal_weights(problem.coordinates, problem.areas, problem.dim)[:, None]
 
-    def apply(x: np.ndarray) -> np.ndarray:
-        sorted_ = (weight * x.reshape(problem.q.shape))[order]
-        out = np.empty(problem.q.shape)
-        out[order] = product(sorted_.reshape(*grid, problem.dim)).reshape(problem.q.shape)
-        return (weight * out).ravel() / mean
+    def on_grid(act: Product, w: np.ndarray, factor: float) -> Product:
+        def apply(x: np.ndarray) -> np.ndarray:
+            sorted_ = (w * x.reshape(problem.q.shape))[order]
+            out = np.empty(problem.q.shape)
+            out[order] = act(sorted_.reshape(*grid.shape, problem.dim)).reshape(problem.q.shape)
+            return np.asarray((factor * w * out).ravel())
 
-    return LinearOperator((problem.q.size, problem.q.size), matvec=apply, rmatvec=apply, dtype=float)
+        return apply
+
+    model = None if inverse is None else on_grid(inverse, 1 / weight, mean)
+    return Preconditioner(problem.q.size, on_grid(product, weight, 1 / mean), model)
 
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
-    """(k dim, dim^2): constant and linear functions of the place in every component: translations, tilts, stretches."""
+    """(k dim, j <= dim^2): constant and linear functions of the place in every component: translations, tilts, stretches.
+
+    Components that cannot move stay at rest; what is then no motion of its own is left out.
+    """
     place = problem.coordinates[: problem.dim - 1]
     place = place - place.mean(axis=1, keepdims=True)
     functions = [np.ones(problem.contacts), *(x / (np.abs(x).max() or 1.0) for x in place)]
-    return np.concatenate([np.kron(f[:, None], np.eye(problem.dim)) for f in functions], axis=1)
+    Z = np.concatenate([np.kron(f[:, None], np.eye(problem.dim)) for f in functions], axis=1)
+    Z[held(problem.Q)] = 0.0
+    _, R = np.linalg.qr(Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300))
+    return Z[:, np.abs(np.diag(R)) > 1e-3]
 
 
-def deflated(P: LinearOperator, Q: LinearOperator | np.ndarray, Z: np.ndarray) -> LinearOperator:
+def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
     """P made exact on the columns of Z (n, j): c (I - Z A^-1 Z'Q) P (I - Q Z A^-1 Z') + Z A^-1 Z' with A = Z'QZ.
 
     The factor c puts the eigenvalues of P Q about 1, where those of the exact part are. Needs j + 1 products with Q once;
-    each application adds O(n j).
+    each application adds O(n j). Its inverse is the block secant update of P^-1 = G (Schnabel 1983),
+    G/c - G/c Z (Z'G/c Z)^-1 Z'G/c + QZ A^-1 (QZ)'.
     """
     QZ = np.asarray(Q @ Z)
     A = np.linalg.inv(Z.T @ QZ)
@@ -146,7 +232,33 @@ def deflated(P: LinearOperator, Q: LinearOperator | np.ndarray, Z: np.ndarray) -
         y = c * (P @ (x - QZ @ coarse))
         return np.asarray(y - Z @ (A @ (QZ.T @ y)) + Z @ coarse)
 
-    return LinearOperator(P.shape, matvec=apply, rmatvec=apply, dtype=float)
+    model = P.model
+    if model is None:
+        return Preconditioner(len(Z), apply)
+    GZ = np.stack([model @ z for z in Z.T], axis=1) / c
+    B = np.linalg.inv(Z.T @ GZ)
+    return Preconditioner(len(Z), apply, lambda x: model @ x / c - GZ @ (B @ (GZ.T @ x)) + QZ @ (A @ (QZ.T @ x)))
+
+
+def restricted(P: Preconditioner, unknowns: np.ndarray, added: np.ndarray | None = None) -> LinearOperator:
+    """An approximate inverse of (Q + diag(added)) on some unknowns (m,), added (m,) >= 0 [length / force].
+
+    With a model G, (G_AA + diag(added))^-1 by an inner PCG; without, the rows and columns A of P (paper, section 5.2).
+    """
+    n, m = P.shape[0], len(unknowns)
+
+    def extended(operator: LinearOperator, x: np.ndarray) -> np.ndarray:
+        full = np.zeros(n)
+        full[unknowns] = x.ravel()
+        return np.asarray((operator @ full)[unknowns])
+
+    rows = LinearOperator((m, m), matvec=lambda x: extended(P, x), dtype=float)
+    if P.model is None:
+        return rows
+    extra = np.zeros(m) if added is None else added
+    model = LinearOperator((m, m), matvec=lambda x: extended(P.model, x) + extra * x.ravel(), dtype=float)
+    inner = LinearOperator((m, m), matvec=lambda x: cg(model, x.ravel(), rtol=ACTIVE, M=rows)[0], dtype=float)
+    return inner
 
 
 def _curve(k: int) -> int:
@@ -165,8 +277,8 @@ def _restricted(symbol: np.ndarray, k: int, axis: int) -> Product:
     return product
 
 
-def _grid(problem: InterfaceProblem) -> tuple[Grid, np.ndarray]:
-    """Contacts along each direction, and the order of the contacts in that grid."""
+def _grid(problem: InterfaceProblem, still: np.ndarray) -> tuple[Grid, np.ndarray]:
+    """The grid of the contacts, and the order of the contacts in it; still (k, dim) masks components that cannot move."""
     x = problem.coordinates[: problem.dim - 1]
     size = np.ptp(problem.coordinates, axis=1).max(initial=0.0)
     ticks, places = [], []
@@ -177,12 +289,14 @@ def _grid(problem: InterfaceProblem) -> tuple[Grid, np.ndarray]:
         place[order] = np.cumsum(starts) - 1
         ticks.append(row[order][starts])
         places.append(place)
-    grid = tuple(len(t) for t in ticks)
-    steps = [np.diff(t) for t in ticks]
-    even = all(len(s) > 1 and np.ptp(s) < 1e-6 * s.mean() for s in steps)
+    shape = tuple(len(t) for t in ticks)
     order = np.lexsort(places[::-1])
-    if not even or np.prod(grid) != problem.contacts or np.any(np.diff(np.ravel_multi_index(places, grid)[order]) != 1):
-        raise InputError(
-            "the preconditioners need contact nodes evenly spaced on a line or a rectangle, 3 or more a side."
-        )
-    return grid, order
+    full = min(shape) > 2 and np.prod(shape) == problem.contacts
+    if not full or np.any(np.diff(np.ravel_multi_index(places, shape)[order]) != 1):
+        raise InputError("the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a side.")
+    lengths = [np.ptp(t) / (len(t) - 1) for t in ticks]
+    aspect = lengths[1] / lengths[0] if len(lengths) > 1 else 1.0
+    on_grid = still[order].reshape(*shape, problem.dim)
+    across = tuple(range(len(shape) - 1))
+    ends = [[on_grid.take(end, axis).all(axis=across) for end in (0, -1)] for axis in range(len(shape))]
+    return Grid(shape, float(aspect), np.moveaxis(np.array(ends), 2, 0)), order

@@ -22,6 +22,7 @@ import numpy as np
 
 from contactopt.cones import friction_cone, split
 from contactopt.errors import InputError
+from contactopt.operators import NOISE, Interface, InterfaceOperator, diagonal
 
 
 class Status(Enum):
@@ -48,7 +49,8 @@ class Status(Enum):
 class InterfaceProblem:
     """Coulomb contact at k nodes in `dim` dimensions, as in the head of this module.
 
-    Q            (k dim, k dim) compliance, symmetric positive semidefinite [length / force]
+    Q            (k dim, k dim) compliance, symmetric positive semidefinite [length / force]: an array, or an
+                 InterfaceOperator that knows it by its products only
     q            (k, dim) displacement at r = 0, lambda = 0 [length]; q_n holds the initial gap
     mu           (k,) friction coefficients
     V, s         (k dim, p) rigid motions and (p,) resultants [force]; p = 0 without a plate
@@ -56,10 +58,11 @@ class InterfaceProblem:
     coordinates  (d, k) positions of the nodes, for output only; 0, 1, 2, ... by default
     bilateral    no separation: u_n = 0, friction bound mu |r_n|
     Raises InputError on wrong shapes, numbers that are not finite, negative mu, an unsymmetric Q or one with a negative
-    diagonal (an indefinite Q is not looked for: its answers are certified like any other).
+    diagonal (an indefinite Q is not looked for: its answers are certified like any other; an operator is taken at its
+    word).
     """
 
-    Q: np.ndarray
+    Q: Interface
     q: np.ndarray
     mu: np.ndarray
     V: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
@@ -74,6 +77,7 @@ class InterfaceProblem:
         if dim not in (2, 3):
             raise InputError(f"q must have 2 or 3 columns (normal first), one row per contact; got shape {q.shape}.")
         places = np.atleast_2d(self.coordinates if np.size(self.coordinates) else np.arange(k))
+        implicit = isinstance(self.Q, InterfaceOperator)
         arrays: dict[str, tuple[Any, tuple[int, ...]]] = {
             "Q": (self.Q, (k * dim, k * dim)),
             "q": (q, (k, dim)),
@@ -84,15 +88,19 @@ class InterfaceProblem:
             "coordinates": (places, (len(places), k)),
         }
         for name, (value, shape) in arrays.items():
-            array = np.array(value, dtype=float)
+            array = self.Q if name == "Q" and implicit else np.array(value, dtype=float)
             if array.shape != shape:
                 raise InputError(f"{name} must have shape {shape}; got {array.shape}.")
+            if array is self.Q:
+                continue
             if not np.all(np.isfinite(array)):
                 raise InputError(f"{name} holds a number that is not finite.")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         if np.any(self.mu < 0):
             raise InputError(f"the friction coefficient mu must not be negative; its least value is {self.mu.min():g}.")
+        if isinstance(self.Q, InterfaceOperator):
+            return
         if np.abs(self.Q - self.Q.T).max(initial=0.0) > 1e-2 * np.abs(self.Q).max(initial=0.0):
             raise InputError("Q must be symmetric (to 1 %); check the order of its rows and columns.")
         if np.diag(self.Q).min(initial=0.0) < -1e-12 * np.abs(self.Q).max(initial=0.0):
@@ -110,9 +118,15 @@ class InterfaceProblem:
     def fingerprint(self) -> str:
         """Digest of the problem's data, for caching and for naming it in tables."""
         digest = hashlib.sha256(bytes([self.bilateral]))
-        for array in (self.Q, self.q, self.mu, self.V, self.s):
+        implicit = isinstance(self.Q, InterfaceOperator)
+        probe = self.Q @ np.random.default_rng(0).normal(size=self.q.size) if implicit else self.Q
+        for array in (probe, self.q, self.mu, self.V, self.s):
             digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()[:16]
+
+    def explicit(self) -> InterfaceProblem:
+        """The same problem with Q an array."""
+        return replace(self, Q=self.Q.to_dense()) if isinstance(self.Q, InterfaceOperator) else self
 
     def displacements(self, reactions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """u = Q r + V lambda + q, (k, dim) [length]."""
@@ -145,8 +159,6 @@ class Solution:
         return self.status is Status.SOLVED
 
 
-NOISE = 1e-13  # relative size of what rounding leaves of a zero
-
 
 @dataclass(frozen=True)
 class Scales:
@@ -171,18 +183,24 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     A component that cannot move (on a symmetry plane, say) carries no force that matters: a unit compliance there
     makes that force zero instead of undetermined.
     """
-    diagonal = np.diag(problem.Q)
-    compliance = float(np.mean(diagonal[diagonal > 0])) if np.any(diagonal > 0) else 1.0
+    d = diagonal(problem.Q)
+    compliance = float(np.mean(d[d > 0])) if np.any(d > 0) else 1.0
     columns = np.linalg.norm(problem.V, axis=0)
     total = np.abs(problem.V).sum(axis=0)
     resultant = np.divide(np.abs(problem.s), total, out=np.zeros(len(problem.s)), where=total > 0)
     force = float(resultant.max(initial=0.0)) or float(np.sqrt(np.mean(problem.q**2))) / compliance or 1.0
     length = force * compliance
     columns = np.where(columns > 0, columns, 1.0)
-    Q = problem.Q / compliance
-    moves = [np.abs(Q).max(axis=1), *np.abs(problem.V.T), np.abs(problem.q.ravel())]
+    implicit = isinstance(problem.Q, InterfaceOperator)
+    sizes = d if implicit else np.abs(problem.Q).max(axis=1)
+    moves = [sizes, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
     rigid = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
-    Q[rigid, rigid] = 1.0
+    Q: Interface
+    if isinstance(problem.Q, InterfaceOperator):
+        Q = problem.Q.scaled(1 / compliance, rigid.astype(float))
+    else:
+        Q = problem.Q / compliance
+        Q[rigid, rigid] = 1.0
     scaled = replace(
         problem,
         Q=Q,
@@ -268,5 +286,5 @@ def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndar
     rows = np.concatenate([pressed[:, None], np.repeat(stuck[:, None], problem.dim - 1, axis=1)], axis=1).ravel()
     if not rows.any():
         return np.zeros(len(problem.s))
-    u = problem.Q[rows] @ reactions.ravel() + problem.q.ravel()[rows]
+    u = (problem.Q @ reactions.ravel())[rows] + problem.q.ravel()[rows]
     return np.asarray(np.linalg.lstsq(problem.V[rows], -u, rcond=None)[0])

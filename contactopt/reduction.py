@@ -1,70 +1,39 @@
 """From two bodies to the interface: u = Q r + V lambda + q by domain decomposition (paper, eqs (13)-(14)).
 
-One sparse factorisation per body, its contact unknowns eliminated last: the trailing triangles of the factors are
-then those of the Schur complement S, and C = S^-1 is the body's compliance. With T the map from displacements to
-local contact frames (n, t1[, t2]) and sigma = +1 for the upper, -1 for the lower body,
+With C = A_ff^-1 the compliance of a body, T the map from displacements to local contact frames (n, t1[, t2]) and
+sigma = +1 for the upper, -1 for the lower body,
 
     A U = f + sigma T' r   on the free unknowns,   U = lift + M lambda_plate on the others,
     u = sum sigma T U + gap n   ==>   Q = sum T C T',   q = sum sigma T U(r=0, lambda=0) + gap n.
 
-A plate's motion, extended into the body by A (Z = M - A_ff^-1 A_f: M), meets the balance Z' A Z lambda = thrust +
-Z' (f - A lift) + sigma (T Z)' r. Motions that no support resists (kernel of Z' A Z) become the multipliers of the
-problem, V = sigma T Z and s = thrust + Z' (f - A lift); the others are condensed into Q and q.
+Q is an array (explicit), from the factors of A_ff with the contact unknowns eliminated last, or an operator (implicit)
+whose product is one solve with each body.
+
+Plate motions Z that no support resists become the multipliers of the problem, V = sigma T Z and
+s = thrust + Z' (f - A lift); the others are condensed into Q and q (contactopt.condensation).
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.linalg as la
 import scipy.sparse as sp
-from scipy.sparse.linalg import LinearOperator, SuperLU, splu
 
-from contactopt.body import Body, build_body
-from contactopt.dissection import nested_dissection
+from contactopt.body import build_body, reload_body
+from contactopt.condensation import ReducedBody, loaded_body, reduce_body
+from contactopt.errors import InputError
 from contactopt.interface import match_bodies, positions
+from contactopt.operators import InterfaceOperator, estimate_diagonal, nodal_weights
 from contactopt.problem import InterfaceProblem
 from contactopt.scene import Part, Scene
 
-KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body's stiffness is free
-
-
-@dataclass(frozen=True, eq=False)
-class ReducedBody:
-    """A factorised Body: U^P, compliance and plate motions; n unknowns, m of them free on the contact boundary.
-
-    interface   (m,) unknowns of C;   compliance  (m, m) C = S^-1 [length / force]
-    at_rest     (n,) displacement at r = 0, lambda = 0 [length]
-    motions     (n, p) displacement fields Z of the free plate motions
-    resultants  (p,) s
-    soft        (n, j) plate motions with elastic resistance, scaled so that each adds soft soft' to the compliance
-    """
-
-    body: Body
-    order: np.ndarray
-    factors: SuperLU
-    interface: np.ndarray
-    compliance: np.ndarray
-    at_rest: np.ndarray
-    motions: np.ndarray
-    resultants: np.ndarray
-    soft: np.ndarray
-
-    def solve(self, load: np.ndarray) -> np.ndarray:
-        """A_ff^-1 load, zero on the prescribed unknowns; load (n,) or (n, j)."""
-        return _solve(self.factors, self.order, load)
-
-    def elastic(self, force: np.ndarray) -> np.ndarray:
-        """Displacement (n,) under nodal forces (n,) with the free plates at rest; prescribed unknowns do not move."""
-        return np.asarray(self.solve(force) + self.soft @ (self.soft.T @ force))
-
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """Displacement of all unknowns under nodal contact forces (n,) and plate displacements (p,), eq (13)."""
-        return np.asarray(self.at_rest + self.elastic(force) + self.motions @ multipliers)
+EXPLICIT = 3000  # interface unknowns up to which Q is formed
+FORMS = ("auto", "explicit", "implicit")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +43,7 @@ class Reduction:
     bodies    ReducedBody of the upper and the lower body, None where rigid
     nodes     contact nodes (k,) of each, in the order of the problem
     frames    (k, dim, dim) rows n, t1[, t2] at each contact
+    gap       (k,) initial gap [length]
     plates    number of multipliers of each body
     seconds   phase -> time
     """
@@ -83,46 +53,66 @@ class Reduction:
     bodies: tuple[ReducedBody | None, ReducedBody | None]
     nodes: tuple[np.ndarray, np.ndarray]
     frames: np.ndarray
+    gap: np.ndarray
     plates: tuple[int, int]
     seconds: dict[str, float]
 
     @property
-    def operator(self) -> LinearOperator:
-        """Q as products by body solves, (k dim, k dim): one forward and one backward substitution per body."""
-        size = self.problem.q.size
-        pairs = [(b, n) for b, n in zip(self.bodies, self.nodes) if b is not None]
-        maps = [(b, _local_map(b.body.basis.nodal_dofs[:, n].T, self.frames, len(b.at_rest))) for b, n in pairs]
-
-        def product(r: np.ndarray) -> np.ndarray:
-            return np.sum([T @ body.elastic(T.T @ r.ravel()) for body, T in maps], axis=0)
-
-        return LinearOperator((size, size), matvec=product, rmatvec=product, dtype=float)
+    def operator(self) -> InterfaceOperator:
+        """Q by its products, whatever the form of problem.Q."""
+        problem = self.problem
+        if isinstance(problem.Q, InterfaceOperator):
+            return problem.Q
+        weights = nodal_weights(problem.coordinates, problem.areas, problem.dim)
+        return _operator(self.bodies, _maps(self.bodies, self.nodes, self.frames), weights)
 
     @property
     def dofs(self) -> int:
         """Free displacement unknowns of both bodies."""
         return sum(len(b.body.free) for b in self.bodies if b is not None)
 
+    def loaded(self, scene: Scene) -> Reduction:
+        """The same bodies, solvers and Q under the loads of another scene of the same structure.
 
-def _solve(factors: SuperLU, order: np.ndarray, load: np.ndarray) -> np.ndarray:
-    out = np.zeros(load.shape)
-    if load.size:
-        out[order] = factors.solve(np.ascontiguousarray(load[order]))
-    return out
+        Values of tractions, body forces, plate forces and support displacements may differ, and mu; nothing else is
+        looked at. Raises InputError if supports or plates hold other unknowns than here.
+        """
+        start = time.perf_counter()
+        parts = (scene.upper, scene.lower)
+        bodies = [
+            None if old is None else loaded_body(old, reload_body(old.body, scene, part))  # type: ignore[arg-type]
+            for old, part in zip(self.bodies, parts)
+        ]
+        maps = _maps(self.bodies, self.nodes, self.frames)
+        q, V, s, plates = _linear_terms(scene, bodies, maps, self.frames, self.gap)
+        problem = replace(self.problem, q=q, V=V, s=s, mu=np.full(len(q), float(scene.mu)), bilateral=scene.bilateral)
+        seconds = {"load": time.perf_counter() - start}
+        return replace(
+            self, scene=scene, problem=problem, bodies=(bodies[0], bodies[1]), plates=plates, seconds=seconds
+        )
 
 
-def reduce(scene: Scene, elements: int | None = None, zone: float | None = None) -> InterfaceProblem:
-    """The interface problem of a scene, Q explicit.
+def reduce(
+    scene: Scene, elements: int | None = None, zone: float | None = None, Q: str = "auto", solver: str = "auto"
+) -> InterfaceProblem:
+    """The interface problem of a scene.
 
-    elements  across the contact half-width (default: the scene's);  zone  half-width the meshes resolve [length].
+    elements  across the contact half-width (default: the scene's);  zone  half-width the meshes resolve [length]
+    Q         'explicit': an array;  'implicit': an InterfaceOperator that solves with the bodies at each product;
+              'auto': the cheaper one (see form_of)
+    solver    of the bodies' linear systems: 'auto' or a name in contactopt.linear.SOLVERS
     Raises InputError on input that cannot be modelled: unknown boundaries, a body free to move,
     nodes that do not match.
     """
-    return reduce_bodies(scene, elements, zone).problem
+    return reduce_bodies(scene, elements, zone, Q, solver).problem
 
 
-def reduce_bodies(scene: Scene, elements: int | None = None, zone: float | None = None) -> Reduction:
-    """As reduce(), keeping the factorised bodies for recovery. Both bodies are processed concurrently."""
+def reduce_bodies(
+    scene: Scene, elements: int | None = None, zone: float | None = None, Q: str = "auto", solver: str = "auto"
+) -> Reduction:
+    """As reduce(), keeping the bodies for recovery. Both bodies are processed concurrently."""
+    if Q not in FORMS:
+        raise InputError(f"unknown form of Q {Q!r}; choose from {', '.join(FORMS)}.")
     elements = scene.elements if elements is None else elements
     zone = scene.zone if zone is None else zone
     seconds: dict[str, float] = {}
@@ -133,115 +123,121 @@ def reduce_bodies(scene: Scene, elements: int | None = None, zone: float | None 
     seconds["assemble"] = time.perf_counter() - start
 
     start = time.perf_counter()
-    with ThreadPoolExecutor(2) as pool:
-        reduced = list(pool.map(lambda body: None if body is None else reduce_body(body), bodies))
+    first, second = both(lambda body: None if body is None else reduce_body(body, solver), bodies)
     seconds["factorise"] = time.perf_counter() - start
 
     start = time.perf_counter()
-    k, dim = len(gap), scene.dim
-    Q, q = np.zeros((k * dim, k * dim)), np.zeros((k, dim))
-    q[:, 0] = gap
-    columns, resultants, plates = [], [], []
-    for part, body, own, sign in zip(parts, reduced, nodes, (1.0, -1.0)):
-        if body is not None:
-            T = _local_map(body.body.basis.nodal_dofs[:, own].T, frames, len(body.at_rest))
-            _add_compliance(Q, T, body)
-            q += sign * (T @ body.at_rest).reshape(k, dim)
-            V, s = sign * (T @ body.motions), body.resultants
-        else:
-            V, s = _rigid_motions(part, scene, frames, sign)
-        columns.append(V)
-        resultants.append(s)
-        plates.append(len(s))
+    reduced = (first, second)
+    maps = _maps(reduced, nodes, frames)
+    points = positions(bodies, nodes)
+    operator = _operator(reduced, maps, nodal_weights(points, areas, scene.dim))
+    form = form_of(operator.shape[0], any(b.solver.name == "multigrid" for b in reduced if b)) if Q == "auto" else Q
+    q, V, s, plates = _linear_terms(scene, reduced, maps, frames, gap)
     problem = InterfaceProblem(
-        Q,
+        operator if form == "implicit" else operator.to_dense(),
         q,
-        np.full(k, float(scene.mu)),
-        np.concatenate(columns, axis=1),
-        np.concatenate(resultants),
+        np.full(len(gap), float(scene.mu)),
+        V,
+        s,
         areas,
-        positions(bodies, nodes),
+        points,
         scene.bilateral,
     )
     seconds["compliance"] = time.perf_counter() - start
-    return Reduction(scene, problem, (reduced[0], reduced[1]), nodes, frames, (plates[0], plates[1]), seconds)
+    return Reduction(scene, problem, reduced, nodes, frames, gap, plates, seconds)
 
 
-def reduce_body(body: Body) -> ReducedBody:
-    """Factorise one body and condense it to its contact unknowns."""
-    contact = np.intersect1d(body.contact_dofs, body.free)
-    order = _elimination_order(body, contact)
-    A = body.A[order][:, order].tocsc()
-    factors = splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    compliance = _trailing_inverse(factors, len(contact))
+def form_of(unknowns: int, iterative: bool) -> str:
+    """The cheaper form of Q for that many interface unknowns m, 'explicit' or 'implicit'.
 
-    residual = body.load - body.A @ body.lift
-    at_rest = body.lift + _solve(factors, order, residual)
-    Z = body.motion - _solve(factors, order, body.A @ body.motion)
-    K = Z.T @ (body.A @ Z)
-    thrust = body.thrust + Z.T @ residual
-    stiffness, modes = np.linalg.eigh((K + K.T) / 2)
-    free = stiffness <= KERNEL * np.max(np.sum(body.motion * (body.A @ body.motion), axis=0), initial=0.0)
-    soft = Z @ (modes[:, ~free] / np.sqrt(stiffness[~free]))
-    at_rest = at_rest + soft @ ((modes[:, ~free] / np.sqrt(stiffness[~free])).T @ thrust)
-    basis = np.eye(len(thrust)) if free.all() else modes[:, free]  # keep one multiplier per plate component
-    motions = Z @ basis
-    return ReducedBody(
-        body, order, factors, order[len(order) - len(contact) :], compliance, at_rest, motions, basis.T @ thrust, soft
-    )
+    Explicit: m^3 operations for the inverse of the Schur complement and again for Newton's steps, 8 m^2 bytes a copy.
+    Implicit: some hundred products. With factors of the bodies the two cost the same at about EXPLICIT unknowns
+    (reports/preconditioners); a body solved by iteration would need m solves for an explicit Q, which never pays.
+    """
+    return "implicit" if iterative or unknowns > EXPLICIT else "explicit"
 
 
-def _elimination_order(body: Body, contact: np.ndarray) -> np.ndarray:
-    """Free unknowns, interior by nested dissection, contact last."""
-    dofs = np.asarray(body.basis.nodal_dofs)
-    adjacency = body.A[dofs[0]][:, dofs[0]]
-    interior = np.ones(dofs.shape[1], dtype=bool)
-    interior[body.nodes] = False
-    inside = np.flatnonzero(interior)
-    pattern = sp.csr_matrix((np.ones(adjacency.nnz, np.int8), adjacency.indices, adjacency.indptr), adjacency.shape)
-    nodes = inside[nested_dissection(pattern[inside][:, inside], body.basis.mesh.p[:, inside])]
-    is_free = np.zeros(len(body.load), dtype=bool)
-    is_free[body.free] = True
-    ordered = np.concatenate([dofs[:, nodes].T.ravel(), dofs[:, body.nodes].T.ravel()])
-    return np.asarray(ordered[is_free[ordered]])
+def both(act: Callable[[Any], Any], bodies: Sequence[Any]) -> tuple[Any, Any]:
+    """`act` on the upper and on the lower body at the same time."""
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(act, bodies)
+    return first, second
 
 
-def _trailing_inverse(factors: SuperLU, m: int) -> np.ndarray:
-    """The trailing m x m block of A^-1 from the factors of A: the inverse of the Schur complement S = L U."""
-    n = factors.shape[0]
-    head = n - m
-    symmetric = np.array_equal(factors.perm_c, factors.perm_r)
-    if symmetric and np.array_equal(np.sort(factors.perm_c[head:]), np.arange(head, n)):
-        L, U = factors.L[head:, head:].toarray(), factors.U[head:, head:].toarray()
-        place = factors.perm_c[head:] - head
-        # S = L U = L D L' with D the pivots: C = (L^-1)' D^-1 L^-1 keeps C symmetric.
-        X = la.solve_triangular(L, np.eye(m), lower=True, unit_diagonal=True)
-        C = (X / np.diag(U)[:, None]).T @ X
-        return np.asarray(C[np.ix_(place, place)])
-    unit = np.zeros((n, m))
-    unit[head:] = np.eye(m)
-    return np.asarray(factors.solve(unit)[head:])
+def _maps(
+    bodies: Sequence[ReducedBody | None], nodes: Sequence[np.ndarray], frames: np.ndarray
+) -> tuple[sp.csr_matrix | None, ...]:
+    """T (k dim, n) of each body: its displacements -> components in the contact frames; None where rigid."""
+    k, dim = frames.shape[:2]
+    maps = []
+    for body, own in zip(bodies, nodes):
+        if body is None:
+            maps.append(None)
+            continue
+        columns = np.repeat(body.body.basis.nodal_dofs[:, own].T, dim, axis=0).ravel()
+        values, rows = frames.ravel(), np.repeat(np.arange(k * dim), dim)
+        keep = values != 0
+        shape = (k * dim, len(body.at_rest))
+        maps.append(sp.csr_matrix((values[keep], (rows[keep], columns[keep])), shape))
+    return tuple(maps)
 
 
-def _local_map(dofs: np.ndarray, frames: np.ndarray, n: int) -> sp.csr_matrix:
-    """T (k dim, n): displacements of a body -> components in the contact frames; dofs (k, dim)."""
-    k, dim = dofs.shape
-    rows = np.repeat(np.arange(k * dim), dim)
-    columns = np.repeat(dofs, dim, axis=0).ravel()
-    values = frames.ravel()
-    keep = values != 0
-    return sp.csr_matrix((values[keep], (rows[keep], columns[keep])), (k * dim, n))
+def _operator(
+    bodies: Sequence[ReducedBody | None], maps: Sequence[sp.csr_matrix | None], weights: np.ndarray
+) -> InterfaceOperator:
+    """Q = sum T (C + soft soft') T' by its products."""
+    pairs = list(zip(bodies, maps))
+
+    def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
+        def moved(pair: tuple[ReducedBody | None, sp.csr_matrix | None]) -> np.ndarray | float:
+            body, T = pair
+            return 0.0 if body is None or T is None else T @ body.elastic(T.T @ X, accuracy)
+
+        first, second = both(moved, pairs)
+        return np.asarray(first + second)
+
+    def entries() -> np.ndarray:
+        terms = [_compliance(T, body) for body, T in pairs if body is not None and T is not None]
+        return terms[0] if len(terms) == 1 else terms[0] + terms[1]
+
+    moves = np.any([_moves(T, body) for body, T in pairs if body is not None and T is not None], axis=0)
+    return InterfaceOperator(product, estimate_diagonal(product, weights, moves), entries)
 
 
-def _add_compliance(Q: np.ndarray, T: sp.csr_matrix, body: ReducedBody) -> None:
-    """Q += T (C + soft soft') T'."""
+def _moves(T: sp.csr_matrix, body: ReducedBody) -> np.ndarray:
+    """(k dim,) mask of the components that the body's elasticity moves."""
+    return np.asarray(abs(T[:, body.interface]).sum(axis=1)).ravel() + np.abs(T @ body.soft).sum(axis=1) > 0
+
+
+def _compliance(T: sp.csr_matrix, body: ReducedBody) -> np.ndarray:
+    """T (C + soft soft') T', symmetric to the last digit."""
     local = T[:, body.interface]
-    half = local @ body.compliance
-    product = local @ half.T
-    Q += (product + product.T) / 2
-    if body.soft.shape[1]:
-        soft = T @ body.soft
-        Q += soft @ soft.T
+    product = local @ (local @ body.compliance).T
+    soft = T @ body.soft
+    return np.asarray((product + product.T) / 2 + soft @ soft.T)
+
+
+def _linear_terms(
+    scene: Scene,
+    bodies: Sequence[ReducedBody | None],
+    maps: Sequence[sp.csr_matrix | None],
+    frames: np.ndarray,
+    gap: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[int, int]]:
+    """q (k, dim), V (k dim, p), s (p,) and the number of multipliers of each body."""
+    q = np.zeros(frames.shape[:2])
+    q[:, 0] = gap
+    columns, resultants = [], []
+    for part, body, T, sign in zip((scene.upper, scene.lower), bodies, maps, (1.0, -1.0)):
+        if body is None:
+            V, s = _rigid_motions(part, scene, frames, sign)
+        else:
+            q += sign * (T @ body.at_rest).reshape(q.shape)
+            V, s = sign * (T @ body.motions), body.resultants
+        columns.append(V)
+        resultants.append(s)
+    plates = len(resultants[0]), len(resultants[1])
+    return q, np.concatenate(columns, axis=1), np.concatenate(resultants), plates
 
 
 def _rigid_motions(rigid: Any, scene: Scene, frames: np.ndarray, sign: float) -> tuple[np.ndarray, np.ndarray]:

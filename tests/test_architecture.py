@@ -9,17 +9,19 @@ import contactopt
 
 ROOT = Path(contactopt.__file__).parent
 ORDER = [
-    "errors", "scene", "analytic", "mesh", "scenes", "body", "dissection", "cones", "problem", "semismooth", "bonded", "preconditioners",
+    "errors", "scene", "analytic", "mesh", "scenes", "body", "dissection", "linear", "cones", "operators", "problem", "semismooth", "bonded", "preconditioners",
     "balance", "mprgp", "models", "backends", "backends.qp", "backends.conic", "backends.direct", "methods",
     "methods.alternating", "methods.tresca", "methods.cone", "methods.apg", "methods.nsgs", "methods.admm",
     "methods.lagrangian", "methods.complementarity", "methods.newton", "methods.proximal",
     "methods.augmented_lagrangian", "methods.auto", "methods.penalty", "driver", "enumeration", "diagnosis", "warm",
-    "interface", "reduction", "zone", "recover", "fclib", "plots", "runner", "cli", "__main__",
+    "interface", "condensation", "reduction", "zone", "recover", "fclib", "plots", "runner", "cli", "__main__",
 ]  # fmt: skip
 FINITE_ELEMENTS = {
     "interface",
     "mesh",
     "body",
+    "condensation",
+    "linear",
     "reduction",
     "zone",
     "recover",

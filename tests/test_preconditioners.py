@@ -3,14 +3,16 @@ import pytest
 import scipy.linalg as la
 from scipy.sparse.linalg import cg
 
-from contactopt import InputError, InterfaceProblem
+from contactopt import InputError, InterfaceProblem, reduce, scenes
 from contactopt.preconditioners import (
     PRECONDITIONERS,
+    Grid,
     deflated,
     norm,
     p21,
     p22,
     preconditioner,
+    restricted,
     seminorm,
     smooth_motions,
 )
@@ -71,10 +73,11 @@ def test_circulants_are_those_of_the_paper(m):
 def test_products_are_those_of_the_dense_matrices(k):
     m = int(2 ** np.ceil(np.log2(k)))
     dense = la.circulant(seminorm(m))[:k, :k]
-    assert np.allclose(p21((k,))(np.eye(k)), dense, atol=1e-13)
+    line = Grid((k,), 1.0, np.zeros((2, 1, 2), bool))
+    assert np.allclose(p21(line)[0](np.eye(k)), dense, atol=1e-13)
     symbol = np.fft.fft(seminorm(m)).real / np.fft.fft(norm(m, 4 / (k - 1))).real
     inner = la.circulant(np.fft.ifft(symbol).real)[:k, :k]
-    assert np.allclose(p22((k,))(np.eye(k)) @ inner, np.eye(k), atol=1e-9)
+    assert np.allclose(p22(line)[0](np.eye(k)) @ inner, np.eye(k), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", PRECONDITIONERS)
@@ -85,7 +88,11 @@ def test_they_are_symmetric_positive_definite_and_blind_to_order_and_units(name)
     order = np.random.default_rng(0).permutation(17)
     rows = (2 * order[:, None] + np.arange(2)).ravel()
     mixed = InterfaceProblem(
-        problem.Q[np.ix_(rows, rows)], problem.q[order], 0.5, coordinates=1e3 * problem.coordinates[:, order]
+        problem.Q[np.ix_(rows, rows)],
+        problem.q[order],
+        0.5,
+        areas=1e6 * problem.areas[order],
+        coordinates=1e3 * problem.coordinates[:, order],
     )
     assert np.allclose(preconditioner(mixed, name) @ np.eye(34), P[np.ix_(rows, rows)], atol=1e-9 * np.abs(P).max())
 
@@ -100,12 +107,12 @@ def test_deflation_is_exact_on_the_deflated_motions():
 def test_bad_input():
     with pytest.raises(InputError, match="unknown preconditioner 'ilu'; choose from p21, p22, neumann"):
         preconditioner(blocks(17, 5.0, 5.0, 0.3), "ilu")
-    uneven = InterfaceProblem(np.eye(8), np.zeros((4, 2)), 0.1, coordinates=np.array([[0.0, 1.0, 2.0, 4.0]]))
+    short = InterfaceProblem(np.eye(4), np.zeros((2, 2)), 0.1)
     ragged = InterfaceProblem(
         np.eye(9), np.zeros((3, 3)), 0.1, coordinates=np.array([[0.0, 1, 2], [0, 1, 3], [0, 0, 0]])
     )
-    for problem in (uneven, ragged):
-        with pytest.raises(InputError, match="evenly spaced"):
+    for problem in (short, ragged):
+        with pytest.raises(InputError, match="on a line or a rectangular grid"):
             preconditioner(problem, "p21")
     with pytest.raises(InputError, match="choose p21 or neumann"):
         preconditioner(solids(5, 5.0, 5.0), "p22")
@@ -121,3 +128,34 @@ def test_in_3d(n):
     bare = np.linalg.cond(problem.Q)
     assert condition(first @ np.eye(size), problem.Q) < 0.6 * bare
     assert condition(deflated(second, problem.Q, smooth_motions(problem)), problem.Q) < 6
+
+
+@pytest.mark.parametrize("make", [lambda: blocks(17, 5.0, 5.0, 0.3), lambda: solids(5, 5.0, 50.0)])
+def test_the_model_is_the_inverse_deflated_or_not(make):
+    problem = make()
+    P = preconditioner(problem, "neumann")
+    for operator in (P, deflated(P, problem.Q, smooth_motions(problem))):
+        both = np.stack([operator.model @ (operator @ x) for x in np.eye(problem.q.size)])
+        assert np.allclose(both, np.eye(problem.q.size), atol=1e-9)
+
+
+@pytest.mark.parametrize("make", [lambda: blocks(33, 5.0, 5e4, 0.3), lambda: solids(7, 5.0, 5.0)])
+def test_on_an_active_set_it_is_as_good_as_on_all_contacts(make):
+    problem = make()
+    Q = problem.Q
+    P = deflated(preconditioner(problem, "neumann"), Q, smooth_motions(problem))
+    everywhere = condition(P, Q)
+    random = np.random.default_rng(1)
+    for share in (0.1, 0.5, 0.9):
+        A = np.flatnonzero(random.random(len(Q)) < share)
+        added = np.where(random.random(len(A)) < 0.5, 0.0, random.random(len(A)) * Q[0, 0])
+        inner = restricted(P, A, added) @ np.eye(len(A))
+        assert condition(inner, Q[np.ix_(A, A)] + np.diag(added)) <= everywhere * (1 + 1e-6)
+
+
+def test_components_held_at_a_plane_of_symmetry_get_sine_transforms():
+    problem = reduce(scenes.flat_punch(2, elements=32))
+    P = deflated(preconditioner(problem, "neumann"), problem.Q, smooth_motions(problem))
+    moves = np.abs(problem.Q).max(axis=1) > 0
+    dense = (P @ np.eye(len(moves)))[np.ix_(moves, moves)]
+    assert condition(dense, problem.Q[np.ix_(moves, moves)]) < 4

@@ -1,0 +1,165 @@
+"""The interface operator Q known by its products: what every method needs that never looks at an entry of Q.
+
+A product costs one solve per body; the entries of Q cost one per interface unknown. Methods that need them ask for
+`dense(Q)`. All functions here take both forms of Q, an array and an InterfaceOperator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator
+
+NOISE = 1e-13  # relative size of what rounding leaves of a zero
+COLUMNS = 64  # unit vectors handed to the bodies at a time when the entries of Q are asked for
+
+Product = Callable[[np.ndarray, float | None], np.ndarray]
+
+
+class InterfaceOperator(LinearOperator):
+    """Q (n, n), symmetric positive semidefinite, by its products [length / force].
+
+    product    x (n,) or (n, j), relative accuracy or None (the best there is) -> Q x
+    diagonal   (n,) diagonal of Q or an estimate of it, exactly 0 where a component cannot move
+    entries    () -> Q (n, n) where there is a cheaper way to it than n products
+    accuracy   relative, of the products; None: the best there is
+    held       (n,) mask of the components that cannot move
+    products   number of columns multiplied so far
+    """
+
+    def __init__(
+        self,
+        product: Product,
+        diagonal: np.ndarray,
+        entries: Callable[[], np.ndarray] | None = None,
+        accuracy: float | None = None,
+    ):
+        super().__init__(np.dtype(float), (len(diagonal), len(diagonal)))
+        self.product, self.diagonal, self.entries, self.accuracy = product, diagonal, entries, accuracy
+        self.held = self.diagonal == 0
+        self.count = [0]
+
+    @property
+    def products(self) -> int:
+        return self.count[0]
+
+    def _matmat(self, X: np.ndarray) -> np.ndarray:
+        self.count[0] += X.shape[1]
+        return np.asarray(self.product(X, self.accuracy))
+
+    def _matvec(self, x: np.ndarray) -> np.ndarray:
+        return self._matmat(x.reshape(-1, 1))[:, 0]
+
+    def _rmatvec(self, x: np.ndarray) -> np.ndarray:
+        return self._matvec(x)
+
+    def _adjoint(self) -> LinearOperator:
+        return self
+
+    def to_dense(self) -> np.ndarray:
+        """Q as an array (n, n), symmetric to the last digit; n products unless there is a cheaper way."""
+        if self.entries is not None:
+            return self.entries()
+        n = self.shape[0]
+        Q = np.empty((n, n))
+        for first in range(0, n, COLUMNS):
+            unit = np.zeros((n, min(COLUMNS, n - first)))
+            unit[first + np.arange(unit.shape[1]), np.arange(unit.shape[1])] = 1.0
+            Q[:, first : first + unit.shape[1]] = self @ unit
+        return np.asarray((Q + Q.T) / 2)
+
+    def scaled(self, factor: float, added: np.ndarray) -> InterfaceOperator:
+        """factor Q + diag(added), counting its own products."""
+
+        def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
+            return factor * self.product(X, accuracy) + added[:, None] * X
+
+        entries = self.entries
+        exact = None if entries is None else lambda: factor * entries() + np.diag(added)
+        scaled = InterfaceOperator(product, factor * self.diagonal + added, exact, self.accuracy)
+        scaled.held = self.held
+        return scaled
+
+    def loosened(self, accuracy: float) -> InterfaceOperator:
+        """The same operator, its products no more accurate than that; both count together."""
+        loose = InterfaceOperator(self.product, self.diagonal, self.entries, accuracy)
+        loose.held, loose.count = self.held, self.count
+        return loose
+
+    def block(self, unknowns: np.ndarray) -> InterfaceOperator:
+        """Q on some unknowns (m,) alone, e.g. its normal block (every dim-th) or an active set; both count together."""
+        unknowns = np.asarray(unknowns)
+
+        def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
+            full = np.zeros((self.shape[0], X.shape[1]))
+            full[unknowns] = X
+            return self.product(full, accuracy)[unknowns]
+
+        entries = self.entries
+        exact = None if entries is None else lambda: entries()[np.ix_(unknowns, unknowns)]
+        part = InterfaceOperator(product, self.diagonal[unknowns], exact, self.accuracy)
+        part.held, part.count = self.held[unknowns], self.count
+        return part
+
+
+Interface = np.ndarray | InterfaceOperator
+
+
+def dense(Q: Interface) -> np.ndarray:
+    """Q as an array (n, n)."""
+    return Q.to_dense() if isinstance(Q, InterfaceOperator) else Q
+
+
+def diagonal(Q: Interface) -> np.ndarray:
+    """The diagonal of Q (n,), or the operator's estimate of it."""
+    return Q.diagonal if isinstance(Q, InterfaceOperator) else np.diag(Q)
+
+
+def held(Q: Interface) -> np.ndarray:
+    """(n,) mask of the components that cannot move: coupled to no other component."""
+    if isinstance(Q, InterfaceOperator):
+        return Q.held
+    size = np.abs(Q)
+    coupling = size.sum(axis=1) - np.diag(size)
+    return np.asarray(coupling <= NOISE * size.max(initial=0.0))
+
+
+def block(Q: Interface, unknowns: np.ndarray) -> Interface:
+    """Q on some unknowns alone."""
+    return Q.block(unknowns) if isinstance(Q, InterfaceOperator) else Q[np.ix_(unknowns, unknowns)]
+
+
+def loosened(Q: Interface, accuracy: float) -> Interface:
+    """Q with products no more accurate than that where it saves work."""
+    return Q.loosened(accuracy) if isinstance(Q, InterfaceOperator) else Q
+
+
+def nodal_weights(coordinates: np.ndarray, areas: np.ndarray, dim: int) -> np.ndarray:
+    """(k,) w with diag(Q) about proportional to 1 / w^2 at each contact, mean of w^2 one.
+
+    A force spread over a node's area makes a displacement that goes with 1 / length of the contact line there (2D) or with
+    1 / square root of the area (3D): w^2 = area / spacing along a line, sqrt(area) on a surface.
+    """
+    if dim == 3:
+        square = np.sqrt(areas)
+    else:
+        order = np.argsort(coordinates[0])
+        steps = np.diff(coordinates[0, order])
+        spacing = np.empty(len(areas))
+        spacing[order] = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]]) if len(steps) else 1.0
+        square = areas / np.where(spacing > 0, spacing, 1.0)
+    positive = square[square > 0]
+    square = np.maximum(square, 1e-2 * np.mean(positive) if len(positive) else 1.0)  # the node on an axis has no area
+    return np.sqrt(square / np.mean(square))
+
+
+def estimate_diagonal(product: Product, weights: np.ndarray, moves: np.ndarray) -> np.ndarray:
+    """diag(Q) (k dim,) from one product: its trace (Hutchinson 1989), shared out by nodal_weights (k,).
+
+    moves  (k dim,) mask of the components that can move; the diagonal is 0 elsewhere
+    """
+    signs = np.where(np.random.default_rng(0).random(len(moves)) < 0.5, -1.0, 1.0) * moves
+    trace = float(signs @ product(signs[:, None], 1e-2)[:, 0])
+    shares = np.repeat(weights**-2, len(moves) // len(weights)) * moves
+    return shares * (trace / shares.sum()) if shares.any() else shares
