@@ -10,6 +10,7 @@ import numpy as np
 
 from contactopt.errors import BackendError, InputError
 from contactopt.methods import Method, default_method, find_method
+from contactopt.operators import InterfaceOperator
 from contactopt.problem import InterfaceProblem, Scales, Solution, Status, dimensionless, natural_map_residual
 from contactopt.scene import check_number
 
@@ -54,8 +55,11 @@ def solve(
             f"settings {', '.join(settings)} belong to a method given by name; set them on the method object."
         )
     _check_equilibrium(problem)
+    if not getattr(method, "implicit", False):
+        problem = problem.explicit()
     scaled, scales = dimensionless(problem)
     recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)
+    operator = scaled.Q if isinstance(scaled.Q, InterfaceOperator) else None
     message, status = "", Status.SETTLED
     steps = method.iterate(scaled, None if start is None else _dimensionless_start(start, problem, scales))
     while True:
@@ -71,7 +75,8 @@ def solve(
         if not all(np.all(np.isfinite(part)) for part in iterate):
             status = Status.DIVERGED
             break
-        ended = recorder.record(*iterate, time.perf_counter() - begin)
+        seconds = time.perf_counter() - begin
+        ended = recorder.record(*iterate, seconds, {} if operator is None else {"products": operator.products})
         if ended is not None:
             status = ended
             break
@@ -112,7 +117,7 @@ class _Recorder:
         self.clock = 0.0
         self.repeated = 0
 
-    def record(self, r: np.ndarray, lam: np.ndarray, seconds: float) -> Status | None:
+    def record(self, r: np.ndarray, lam: np.ndarray, seconds: float, counts: dict[str, float]) -> Status | None:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
         self.clock += seconds
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)
@@ -120,7 +125,7 @@ class _Recorder:
         change = _relative(self.reactions[:, 1:], self.recent[-1][:, 1:])
         repeats = [m for m, old in enumerate(reversed(self.recent), 1) if _relative(self.reactions, old) < SAME]
         self.recent = [*self.recent[1 - CYCLE :], self.reactions]
-        self.history.append({"residual": self.residual, "change": change, "seconds": self.clock})
+        self.history.append({"residual": self.residual, "change": change, "seconds": self.clock} | counts)
         if self.progress is not None:
             self.progress(len(self.history), self.residual)
         if self.residual <= self.tol:

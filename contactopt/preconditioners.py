@@ -26,6 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.fft import dct, dst, idct, idst, irfft, rfft
 from scipy.sparse.linalg import LinearOperator, cg
 
@@ -170,14 +171,19 @@ PRECONDITIONERS: dict[str, tuple[Callable[[Grid], tuple[Product, Product | None]
 }
 
 
+def find_preconditioner(name: str | None) -> None:
+    """InputError unless there is a preconditioner of that name; None and 'none' are choices of the methods."""
+    if name not in (None, "none", *PRECONDITIONERS):
+        raise InputError(f"unknown preconditioner {name!r}; choose from {', '.join(PRECONDITIONERS)}.")
+
+
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
     """The named approximate inverse of problem.Q, (k dim, k dim).
 
     `neumann` is weighted by nodal_weights. Uses of Q only its mean diagonal and which components cannot move.
     Raises InputError for an unknown name, fewer than 3 contacts a side, or contacts not on a line or rectangular grid.
     """
-    if name not in PRECONDITIONERS:
-        raise InputError(f"unknown preconditioner {name!r}; choose from {', '.join(PRECONDITIONERS)}.")
+    find_preconditioner(name)
     still = held(problem.Q)
     mean = float(np.mean(diagonal(problem.Q)[~still])) if not still.all() else 1.0
     grid, order = _grid(problem, still.reshape(problem.q.shape))
@@ -188,10 +194,10 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
 
     def on_grid(act: Product, w: np.ndarray, factor: float) -> Product:
         def apply(x: np.ndarray) -> np.ndarray:
-            sorted_ = (w * x.reshape(problem.q.shape))[order]
+            sorted_ = (w * np.where(still, 0.0, x).reshape(problem.q.shape))[order]
             out = np.empty(problem.q.shape)
             out[order] = act(sorted_.reshape(*grid.shape, problem.dim)).reshape(problem.q.shape)
-            return np.asarray((factor * w * out).ravel())
+            return np.where(still, x, (factor * w * out).ravel())  # what cannot move is on its own
 
         return apply
 
@@ -240,25 +246,25 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
     return Preconditioner(len(Z), apply, lambda x: model @ x / c - GZ @ (B @ (GZ.T @ x)) + QZ @ (A @ (QZ.T @ x)))
 
 
-def restricted(P: Preconditioner, unknowns: np.ndarray, added: np.ndarray | None = None) -> LinearOperator:
-    """An approximate inverse of (Q + diag(added)) on some unknowns (m,), added (m,) >= 0 [length / force].
+def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> LinearOperator:
+    """An approximate inverse of U'QU + diag(added), for U (n, m) with orthonormal columns and added (m,) >= 0.
 
-    With a model G, (G_AA + diag(added))^-1 by an inner PCG; without, the rows and columns A of P (paper, section 5.2).
+    U selects the unknowns of an active set, or directions in which contacts may still move. With a model G of Q,
+    (U'GU + diag(added))^-1 by an inner PCG; without, U'PU (paper, section 5.2).
     """
-    n, m = P.shape[0], len(unknowns)
-
-    def extended(operator: LinearOperator, x: np.ndarray) -> np.ndarray:
-        full = np.zeros(n)
-        full[unknowns] = x.ravel()
-        return np.asarray((operator @ full)[unknowns])
-
-    rows = LinearOperator((m, m), matvec=lambda x: extended(P, x), dtype=float)
+    m = U.shape[1]
+    rows = LinearOperator((m, m), matvec=lambda x: U.T @ (P @ (U @ x.ravel())), dtype=float)
     if P.model is None:
         return rows
-    extra = np.zeros(m) if added is None else added
-    model = LinearOperator((m, m), matvec=lambda x: extended(P.model, x) + extra * x.ravel(), dtype=float)
-    inner = LinearOperator((m, m), matvec=lambda x: cg(model, x.ravel(), rtol=ACTIVE, M=rows)[0], dtype=float)
-    return inner
+    model = P.model
+    system = LinearOperator((m, m), matvec=lambda x: U.T @ (model @ (U @ x.ravel())) + added * x.ravel(), dtype=float)
+    return LinearOperator((m, m), matvec=lambda x: cg(system, x.ravel(), rtol=ACTIVE, M=rows)[0], dtype=float)
+
+
+def selection(n: int, unknowns: np.ndarray) -> sp.csr_matrix:
+    """U (n, m) whose columns are the unit vectors of these unknowns (m,)."""
+    m = len(unknowns)
+    return sp.csr_matrix((np.ones(m), (unknowns, np.arange(m))), (n, m))
 
 
 def _curve(k: int) -> int:

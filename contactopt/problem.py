@@ -140,7 +140,8 @@ class Solution:
     reactions    (k, dim) nodal forces on the upper body, normal first [force]
     multipliers  (p,) displacements lambda of the plates [length]
     residual     the certificate: natural_map_residual(problem, reactions, multipliers)
-    history      one mapping per outer iteration: residual, change (of the tangential force), seconds
+    history      one mapping per outer iteration: residual, change (of the tangential force), seconds and, where Q is an
+                 operator, products, the method's products with Q so far
     seconds      phase -> time
     """
 
@@ -155,9 +156,13 @@ class Solution:
     message: str = ""
 
     @property
+    def products(self) -> int:
+        """Products with Q that the method took, of which the certificate has its own; 0 where Q is an array."""
+        return int(self.history[-1].get("products", 0)) if self.history else 0
+
+    @property
     def solved(self) -> bool:
         return self.status is Status.SOLVED
-
 
 
 @dataclass(frozen=True)

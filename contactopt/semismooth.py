@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 import scipy.linalg as la
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from contactopt.errors import BackendError
+from contactopt.operators import Interface
 
 # y (k, d) -> P(y) and its generalised derivative (k, d, d); zero where the contact is open
 Projection = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -23,7 +23,6 @@ Projection = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 STEPS = 20  # of a crossover
 RIDGE = 1e-10  # added to Q in every Newton system: directions without compliance stay where they are
 GOOD = 1e-14  # relative residual below which rounding is all that is left
-KRYLOV = 1e-10  # relative accuracy of a matrix-free step
 EXACT, WRONG = 1e-9, 1e-5  # relative residuals up to which an answer needs no second try, and above which it is none
 
 
@@ -35,7 +34,7 @@ class Equations:
 
     def __init__(
         self,
-        Q: np.ndarray,
+        Q: Interface,
         q: np.ndarray,
         V: np.ndarray,
         s: np.ndarray,
@@ -103,27 +102,6 @@ class Equations:
             return None
         dr[rows] = x[:n]
         return dr.reshape(k, d), x[n:]
-
-    def krylov_step(
-        self, error: np.ndarray, balance: np.ndarray, D: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray] | None:
-        """The same step by GMRES, from products with Q alone; None if it does not get anywhere."""
-        (k, d), p = error.shape, len(balance)
-        rho = self.rho[:, None]
-
-        def product(x: np.ndarray) -> np.ndarray:
-            dr = x[: k * d].reshape(k, d)
-            moved = (self.Q @ x[: k * d] + self.V @ x[k * d :]).reshape(k, d) + (self.weight + RIDGE) * dr
-            bent = np.einsum("kab,kb->ka", D, dr - rho * moved)
-            return np.concatenate([(dr - bent).ravel(), self.V.T @ x[: k * d]])
-
-        right = np.concatenate([error.ravel(), -balance])
-        size = float(np.linalg.norm(right))
-        operator = LinearOperator((k * d + p, k * d + p), matvec=product, dtype=float)
-        x, _ = gmres(operator, right, rtol=KRYLOV, restart=min(len(right), 300), maxiter=3)
-        if not np.all(np.isfinite(x)) or np.linalg.norm(product(x) - right) > 0.5 * size:
-            return None
-        return x[: k * d].reshape(k, d), x[k * d :]
 
 
 def crossover(

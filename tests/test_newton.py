@@ -61,10 +61,10 @@ def test_newton_step_solves_the_linearised_equations(p):
 @pytest.mark.parametrize("name", SMALL)
 def test_matrix_free_newton_takes_the_same_steps(name):
     problem = reduce(make_scene(name, mu=0.3, elements=SMALL[name]))
-    dense, free = solve(problem, "newton", tol=1e-9), solve(problem, "newton", tol=1e-9, linear="gmres")
-    assert free.solved and free.iterations == dense.iterations
+    dense, free = solve(problem, "newton", tol=1e-9), solve(problem, "newton", tol=1e-9, linear="krylov")
+    assert free.solved and free.iterations <= dense.iterations + 2  # its steps are no more accurate than pays
     assert np.allclose(free.reactions, dense.reactions, atol=1e-7)
-    with pytest.raises(InputError, match="choose dense or gmres"):
+    with pytest.raises(InputError, match="choose dense or krylov"):
         solve(problem, "newton", linear="magic")
 
 
@@ -194,7 +194,7 @@ def test_auto_leaves_newton_when_it_cycles(monkeypatch):
     problem, _ = dimensionless(rigid_bodies(1, 6, 14, 0.7))
     wrong = np.ones(problem.q.shape)
     monkeypatch.setattr(
-        "contactopt.methods.newton.Newton.iterate", lambda self, p, s=None: iter([(wrong, np.zeros(0))] * 50)
+        "contactopt.methods.newton.Newton.steps", lambda self, p, s=None: iter([((wrong, np.zeros(0)), 1.0)] * 50)
     )
     points = []
     for point in Auto().iterate(problem):

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from itertools import islice
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from contactopt.methods import NATIVE, Iterate
 from contactopt.methods.cone import AcaryCadoux
 from contactopt.methods.newton import Newton, cold_start, coulomb_equations
 from contactopt.methods.proximal import Proximal
+from contactopt.preconditioners import find_preconditioner
 from contactopt.problem import InterfaceProblem
 
 LIMIT = 25  # Newton steps
@@ -37,13 +39,20 @@ LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 
 @dataclass(frozen=True)
 class Auto:
-    """No settings."""
+    """preconditioner: of Newton's steps where Q is an operator; None: the best that fits the contacts."""
+
+    preconditioner: str | None = None
+    implicit: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        find_preconditioner(self.preconditioner)
 
     def backends(self, dim: int) -> tuple[str, str]:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        reached = yield from self._newton(problem, start)
+        reached = yield from self._newton(problem, start, self.preconditioner)
+        problem = problem.explicit()  # all that follows looks at the entries of Q
         reached = yield from self._cones(problem, reached)
         random = np.random.default_rng(0)
         while True:
@@ -54,13 +63,13 @@ class Auto:
             reached = coulomb_cone(r, problem.mu), last[1]
 
     @staticmethod
-    def _newton(problem: InterfaceProblem, start: Iterate | None) -> Generator[Iterate, None, Iterate]:
+    def _newton(
+        problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
+    ) -> Generator[Iterate, None, Iterate]:
         """Newton's iterates; returns the best."""
-        equations = coulomb_equations(problem)
         best, reached, since = np.inf, start, 0
-        for count, point in enumerate(Newton().iterate(problem, start)):
+        for count, (point, residual) in enumerate(Newton(preconditioner=preconditioner).steps(problem, start)):
             yield point
-            residual = equations.evaluate(*point)[0]
             since = 0 if residual < PROGRESS * best else since + 1
             if residual < best:
                 best, reached = residual, point
