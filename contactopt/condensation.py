@@ -60,6 +60,14 @@ class ReducedBody:
         out[free] += self.solver.solve(force[free], accuracy)
         return out
 
+    def contact_motion(self, force: np.ndarray, accuracy: float | None = None) -> np.ndarray:
+        """As elastic() under forces on the interface alone, right there and zero elsewhere; cheaper."""
+        out = np.zeros(force.shape)
+        out[self.interface] = self.solver.trailing_product(force[self.interface], accuracy)
+        if self.soft.shape[1]:
+            out += self.soft @ (self.soft.T @ force)
+        return out
+
     def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """Displacement of all unknowns under nodal contact forces (n,) and plate displacements (p,), eq (13)."""
         return np.asarray(self.at_rest + self.elastic(force) + self.motions @ multipliers)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -22,8 +23,11 @@ from scipy.sparse.linalg import splu
 
 from contactopt.dissection import nested_dissection
 from contactopt.errors import BackendError, InputError
+from contactopt.multigrid import VCycle
+from contactopt.scene import check_number
 
 RTOL = 1e-10  # default accuracy of an iterative solve
+MOST = 300  # conjugate gradient iterations
 
 
 class BodySolver(Protocol):
@@ -41,6 +45,9 @@ class BodySolver(Protocol):
 
     def trailing_inverse(self) -> np.ndarray:
         """The block of A^-1 on the unknowns `last`, in their order, (m, m) symmetric; InputError without `last`."""
+
+    def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
+        """That block times `load`, (m,) or (m, j)."""
 
 
 def make_solver(
@@ -92,19 +99,37 @@ class SuperLUSolver:
             out[self.order] = self.factors.solve(np.ascontiguousarray(load[self.order]))
         return out
 
-    def trailing_inverse(self) -> np.ndarray:
+    @cached_property
+    def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """R (m, m) lower triangular and the place (m,) of each of `last`: R R' is the Schur complement in these places.
+
+        None where SuperLU changed the order for its pivots.
+        """
         factors, m = self.factors, len(_asked(self.last))
         n = factors.shape[0]
         head = n - m
         symmetric = np.array_equal(factors.perm_c, factors.perm_r)
         if not symmetric or not np.array_equal(np.sort(factors.perm_c[head:]), np.arange(head, n)):
-            return _inverse_block(self, n)
-        L, U = factors.L[head:, head:].toarray(), factors.U[head:, head:].toarray()
-        place = factors.perm_c[head:] - head
-        # S = L U = L D L' with D > 0 the pivots: S^-1 = X' X, X = D^-1/2 L^-1; NumPy keeps X' X symmetric.
-        X = la.solve_triangular(L, np.eye(m), lower=True, unit_diagonal=True) / np.sqrt(np.diag(U))[:, None]
-        C = X.T @ X
+            return None
+        L, pivots = factors.L[head:, head:].toarray(order="F"), factors.U.diagonal()[head:]
+        return L * np.sqrt(pivots), factors.perm_c[head:] - head  # L U = L D L' with D > 0 the pivots
+
+    def trailing_inverse(self) -> np.ndarray:
+        if self.trailing_triangle is None:
+            return _inverse_block(self, len(self.order))
+        R, place = self.trailing_triangle
+        X = la.solve_triangular(R, np.eye(len(R)), lower=True, check_finite=False)
+        C = X.T @ X  # NumPy keeps it symmetric
         return np.asarray(C[np.ix_(place, place)])
+
+    def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
+        """Two triangular solves with the trailing triangle: nothing of the interior is touched."""
+        if self.trailing_triangle is None:
+            return _block_product(self, len(self.order), load, rtol)
+        R, place = self.trailing_triangle
+        x = np.empty(load.shape)
+        x[place] = load
+        return np.asarray(la.cho_solve((R, True), x, check_finite=False))[place]
 
 
 def elimination_order(
@@ -158,11 +183,15 @@ class PardisoSolver:
     def trailing_inverse(self) -> np.ndarray:
         return _inverse_block(self, self.upper.shape[0])
 
+    def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
+        return _block_product(self, self.upper.shape[0], load, rtol)
+
 
 class MultigridSolver:
-    """Conjugate gradients preconditioned by smoothed aggregation with the rigid motions (pip install pyamg).
+    """Conjugate gradients preconditioned by contactopt.multigrid (pip install pyamg).
 
-    solve() ends where |b - A x| <= rtol |b|; BackendError if it does not get there.
+    solve() ends where (r' B r)^1/2, r the residual and B the V-cycle, has fallen by `rtol`: an estimate of the error in
+    the energy norm, relative to the solution's. BackendError if it does not get there.
     """
 
     name = "multigrid"
@@ -175,75 +204,42 @@ class MultigridSolver:
         points: np.ndarray,
         last: np.ndarray | None = None,
     ):
-        try:
-            import pyamg
-        except ImportError as error:
-            raise InputError("the body solver 'multigrid' needs the package pyamg: pip install pyamg.") from error
         self.last = last
         self.iterations = 0
-        self.A = A
-        dim = len(points)
-        present, own = np.unique(node, return_inverse=True)
-        self.place = own * dim + component
-        size = len(present) * dim
-        where = sp.csr_matrix((np.ones(len(own)), (self.place, np.arange(len(own)))), (size, len(own)))
-        held = np.ones(size)
-        held[self.place] = 0.0
-        full = (where @ A @ where.T + sp.diags(held * np.median(A.diagonal()))).tobsr((dim, dim))
-        modes = rigid_motions(points[:, present])
-        modes[held > 0] = 0.0
-        self.hierarchy = pyamg.smoothed_aggregation_solver(
-            full, modes, improve_candidates=None, max_coarse=300, coarse_solver="pinv"
-        )
-        self.cycle = self.hierarchy.aspreconditioner()
+        self.cycle = VCycle(A, node, component, points)
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        from scipy.sparse.linalg import LinearOperator, cg
-
+        rtol = RTOL if rtol is None else rtol
+        check_number("rtol", rtol, low=0.0, high=1.0)
         columns = load.reshape(len(load), -1)
         out = np.zeros(columns.shape)
-        n = self.A.shape[0]
-        counts = [0] * columns.shape[1]
-
-        def apply(r: np.ndarray) -> np.ndarray:
-            full = np.zeros(self.cycle.shape[0])
-            full[self.place] = r
-            return np.asarray((self.cycle @ full)[self.place])
-
-        for j in range(columns.shape[1]):
-
-            def count(_: Any, j: int = j) -> None:
-                counts[j] += 1
-
-            out[:, j], info = cg(
-                self.A,
-                columns[:, j],
-                rtol=RTOL if rtol is None else rtol,
-                maxiter=500,
-                M=LinearOperator((n, n), matvec=apply),
-                callback=count,
-            )
-            if info:
-                raise BackendError("multigrid: conjugate gradients did not converge.")
-        self.iterations = max(counts, default=0)
+        self.iterations = 0
+        for b, x in zip(columns.T, out.T):
+            x[:] = self.cycle.scale * self._conjugate_gradients(self.cycle.scale * b, rtol)
         return out.reshape(load.shape)
 
+    def _conjugate_gradients(self, r: np.ndarray, rtol: float) -> np.ndarray:
+        """Solution of the scaled system for the right-hand side r."""
+        x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
+        for step in range(MOST + 1):
+            z = self.cycle.apply(r)
+            size, previous = float(r @ z), size
+            goal = rtol**2 * size if goal is None else goal
+            if size <= goal:
+                self.iterations = max(self.iterations, step)
+                return x
+            p = z + (size / previous) * p
+            Ap = self.cycle.A @ p
+            alpha = size / float(p @ Ap)
+            x += alpha * p
+            r = r - alpha * Ap
+        raise BackendError(f"multigrid: the error was not reduced by {rtol:g} within {MOST} iterations.")
+
     def trailing_inverse(self) -> np.ndarray:
-        return _inverse_block(self, self.A.shape[0])
+        return _inverse_block(self, len(self.cycle.scale))
 
-
-def rigid_motions(points: np.ndarray) -> np.ndarray:
-    """Translations and rotations at points (dim, k), as columns (k dim, 3 or 6), unknowns of a point in a row."""
-    dim, k = points.shape
-    x = points - points.mean(axis=1, keepdims=True)
-    x = x / (np.abs(x).max(initial=0.0) or 1.0)
-    columns = [np.repeat(np.eye(dim)[:, [i]], k, axis=1) for i in range(dim)]
-    for i in range(dim):
-        for j in range(i):
-            turn = np.zeros((dim, k))
-            turn[i], turn[j] = x[j], -x[i]
-            columns.append(turn)
-    return np.stack([c.T.ravel() for c in columns], axis=1)
+    def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
+        return _block_product(self, len(self.cycle.scale), load, rtol)
 
 
 def _asked(last: np.ndarray | None) -> np.ndarray:
@@ -262,6 +258,14 @@ def _inverse_block(solver: Any, n: int, columns: int = 64) -> np.ndarray:
         unit[chosen, np.arange(len(chosen))] = 1.0
         C[:, start : start + columns] = solver.solve(unit)[last]
     return np.asarray((C + C.T) / 2)
+
+
+def _block_product(solver: Any, n: int, load: np.ndarray, rtol: float | None) -> np.ndarray:
+    """The block of the inverse on solver.last times load (m,) or (m, j), by a solve."""
+    last = _asked(solver.last)
+    full = np.zeros((n, *load.shape[1:]))
+    full[last] = load
+    return np.asarray(solver.solve(full, rtol)[last])
 
 
 SOLVERS: dict[str, Callable[..., BodySolver]] = {

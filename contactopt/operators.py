@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
+FORMS = ("auto", "explicit", "implicit")  # of Q
 NOISE = 1e-13  # relative size of what rounding leaves of a zero
 COLUMNS = 64  # unit vectors handed to the bodies at a time when the entries of Q are asked for
 
@@ -123,6 +124,15 @@ def held(Q: Interface) -> np.ndarray:
     size = np.abs(Q)
     coupling = size.sum(axis=1) - np.diag(size)
     return np.asarray(coupling <= NOISE * size.max(initial=0.0))
+
+
+def shifted(Q: Interface, added: np.ndarray) -> Interface:
+    """Q + diag(added), added (n,); products count with those of Q."""
+    if not isinstance(Q, InterfaceOperator):
+        return Q + np.diag(added)
+    sum_ = Q.scaled(1.0, added)
+    sum_.count = Q.count
+    return sum_
 
 
 def block(Q: Interface, unknowns: np.ndarray) -> Interface:

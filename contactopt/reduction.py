@@ -28,12 +28,11 @@ from contactopt.body import build_body, reload_body
 from contactopt.condensation import ReducedBody, loaded_body, reduce_body
 from contactopt.errors import InputError
 from contactopt.interface import match_bodies, positions
-from contactopt.operators import InterfaceOperator, estimate_diagonal, nodal_weights
+from contactopt.operators import FORMS, InterfaceOperator, estimate_diagonal, nodal_weights
 from contactopt.problem import InterfaceProblem
 from contactopt.scene import Part, Scene
 
 EXPLICIT = 3000  # interface unknowns up to which Q is formed
-FORMS = ("auto", "explicit", "implicit")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +64,11 @@ class Reduction:
             return problem.Q
         weights = nodal_weights(problem.coordinates, problem.areas, problem.dim)
         return _operator(self.bodies, _maps(self.bodies, self.nodes, self.frames), weights)
+
+    @property
+    def iterative(self) -> bool:
+        """Whether a body's linear system is solved by iteration."""
+        return any(b is not None and b.solver.name == "multigrid" for b in self.bodies)
 
     @property
     def dofs(self) -> int:
@@ -191,7 +195,7 @@ def _operator(
     def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
         def moved(pair: tuple[ReducedBody | None, sp.csr_matrix | None]) -> np.ndarray | float:
             body, T = pair
-            return 0.0 if body is None or T is None else T @ body.elastic(T.T @ X, accuracy)
+            return 0.0 if body is None or T is None else T @ body.contact_motion(T.T @ X, accuracy)
 
         first, second = both(moved, pairs)
         return np.asarray(first + second)

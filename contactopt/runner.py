@@ -16,6 +16,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.methods import default_method, find_method
+from contactopt.operators import InterfaceOperator
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.recover import Fields, recover
 from contactopt.reduction import Reduction
@@ -59,6 +60,9 @@ def run(
     method: str | None = None,
     normal: str | None = None,
     tangential: str | None = None,
+    preconditioner: str | None = None,
+    Q: str = "auto",
+    solver: str = "auto",
     tol: float = 1e-8,
     elements: int | None = None,
     note: Note = lambda text: None,
@@ -68,6 +72,8 @@ def run(
 
     scene     a name (see contactopt.scenes.SCENES), `changes` to its arguments; or a Scene, `changes` to its fields
     method, normal, tangential   names; by default `auto`, or `alternating` if a backend is named
+    preconditioner   of methods that take products with Q, a name in contactopt.preconditioners; selects Q = 'implicit'
+    Q, solver  form of Q and solver of the bodies, see reduce()
     elements  across the contact half-width;  tol  bound on the natural-map residual;  note  receives progress messages
     Raises InputError with a sentence that says what to do; nothing is left half-written.
     """
@@ -75,12 +81,16 @@ def run(
     if elements is not None:
         changes["elements"] = elements
     scene = make_scene(scene, **changes) if isinstance(scene, str) else _changed(scene, changes)
-    given = {k: v for k, v in (("normal", normal), ("tangential", tangential)) if v is not None}
+    if preconditioner is not None and Q == "explicit":
+        raise InputError("a preconditioner serves products with Q, but Q = 'explicit' was asked for; drop one of them.")
+    Q = "implicit" if preconditioner is not None else Q
+    names = {"normal": normal, "tangential": tangential, "preconditioner": preconditioner}
+    given = {key: name for key, name in names.items() if name is not None}
     method = method or default_method(given)
     chosen = find_method(method, **given)
     backends = chosen.backends(scene.dim)  # refused here, before any work, if one of them cannot be used
     target = None if out is None else _writable(Path(out))
-    reduction, solution, zones = solve_zone(scene, note=note, method=chosen, tol=tol)
+    reduction, solution, zones = solve_zone(scene, note=note, Q=Q, solver=solver, method=chosen, tol=tol)
     seconds = dict(solution.seconds)
     with _Timer(seconds, "recover"):
         fields = recover(reduction, solution)
@@ -122,6 +132,8 @@ def _summary(
         "status": solution.status.label,
         "residual": float(solution.residual),
         "outer_iterations": solution.iterations,
+        "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
+        "products": solution.products,
         "normal_force": float(r[:, 0].sum()),
         "approach": _approach(problem, solution),
         "contact_half_width": float(width),

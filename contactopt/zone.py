@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,6 +20,10 @@ from contactopt.warm import transfer
 FIT = 4  # nodes next to the edge through which p^2 is extrapolated
 AGREE = 0.05  # two zones agree when they differ by less than this fraction of an element
 LOOPS = 10
+COARSEST = 4  # elements across the contact half-width of the first of nested meshes
+ROUGH = 1e-6  # certificate asked of a coarse mesh: its own error is larger
+
+Note = Callable[[str], None]
 
 
 def pressed(reactions: np.ndarray) -> np.ndarray:
@@ -70,7 +75,9 @@ def stick_half_width(scene: Scene, problem: InterfaceProblem, reactions: np.ndar
 def solve_zone(
     scene: Scene,
     elements: int | None = None,
-    note: Callable[[str], None] = lambda text: None,
+    note: Note = lambda text: None,
+    Q: str = "auto",
+    solver: str = "auto",
     **settings: Any,
 ) -> tuple[Reduction, Solution, list[float]]:
     """Reduce and solve; where the scene has a contact zone, remesh until its edge is a node of both meshes.
@@ -78,7 +85,8 @@ def solve_zone(
     Each round solves on meshes with a node at the present zone's edge and reads the new edge from the reactions; two
     zones agree when they differ by a twentieth of an element. Returns the last reduction and solution with the zones
     tried, the last of them the result, none if there is no loop; `seconds` are summed over the rounds, each of which starts
-    from the one before. settings go to solve().
+    from the one before. Q and solver go to reduce(), settings to solve(). Where bodies are solved by iteration, the first
+    start is the solution on meshes half as fine.
     """
     elements = scene.elements if elements is None else elements
     seconds: Counter[str] = Counter()
@@ -86,7 +94,9 @@ def solve_zone(
     zones = [scene.zone] if scene.zone is not None else []
     while True:
         note(f"reducing {scene.name}" + (f", zone {zones[-1]:.6g}" if zones else ""))
-        reduction = reduce_bodies(scene, elements, zones[-1] if zones else None)
+        reduction = reduce_bodies(scene, elements, zones[-1] if zones else None, Q, solver)
+        if previous is None and reduction.iterative and elements >= 2 * COARSEST:
+            previous = _coarse(scene, elements // 2, note, settings, seconds)
         note(f"solving {reduction.problem.contacts} contacts")
         start = None if previous is None else transfer(*previous, reduction.problem)
         solution = solve(reduction.problem, start=start, **settings)
@@ -103,3 +113,14 @@ def solve_zone(
         zones.append(width)
         if agreed or solution.status not in (Status.SOLVED, Status.SETTLED) or len(zones) > LOOPS:
             return reduction, solution, zones
+
+
+def _coarse(
+    scene: Scene, elements: int, note: Note, settings: dict[str, Any], seconds: Counter[str]
+) -> tuple[InterfaceProblem, Solution]:
+    """The problem on coarser meshes and its solution, itself started from a coarser one where bodies need iteration."""
+    rough = settings | {"tol": max(ROUGH, settings.get("tol", 0.0))}
+    begin = time.perf_counter()
+    reduction, solution, _ = solve_zone(replace(scene, zone=None), elements, note, **rough)
+    seconds["coarse"] += time.perf_counter() - begin
+    return reduction.problem, solution

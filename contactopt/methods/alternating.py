@@ -7,59 +7,86 @@ Tangential problem, r_n fixed (eq (22)): a box-constrained QP with one tangentia
 The multipliers of the balance rows are the plates' displacements. Plates that move tangentially only belong to the
 tangential problem. Each iteration costs one QP and one QP or SOCP. It contracts where friction couples weakly to the
 normal force (small mu, similar bodies) and may cycle otherwise; relaxation < 1 then often helps. A backend's answer is
-made exact by active-set steps, or asked for again at tighter settings.
+made exact by active-set steps, or asked for again at tighter settings. The backend `pcg`, for both problems, forms no
+entry of Q: active sets and conjugate gradients with the preconditioners of contactopt.preconditioners.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from contactopt.backends import CONIC, QP, attempts, find
 from contactopt.backends.conic import DiscSOCP
 from contactopt.backends.qp import BoxQP
-from contactopt.cones import disc_derivative, half_line_derivative, whole_line_derivative
+from contactopt.cones import disc_derivative, half_line_derivative, split, whole_line_derivative
 from contactopt.errors import InputError
+from contactopt.krylov import model_of
 from contactopt.methods import Iterate
+from contactopt.preconditioners import find_preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.scene import check_number
 from contactopt.semismooth import Equations, certified
+from contactopt.subproblems import KrylovSubproblem
+
+PCG = "pcg"  # the backend that needs no entry of Q
 
 
 @dataclass(frozen=True)
 class Alternating:
     """normal, tangential: names of the backends; tangential None is proxqp for intervals, clarabel for discs.
 
-    relaxation in (0, 1]: the fraction of each new tangential force that is taken.
+    relaxation in (0, 1]: the fraction of each new tangential force that is taken; preconditioner: of the backend `pcg`.
     """
 
     normal: str = "proxqp"
     tangential: str | None = None
     relaxation: float = 1.0
+    preconditioner: str | None = None
 
     def __post_init__(self) -> None:
         check_number("the relaxation", self.relaxation, low=0.0, high=1.0 + 1e-12)
+        find_preconditioner(self.preconditioner)
+
+    @property
+    def implicit(self) -> bool:
+        """Takes an operator for Q."""
+        return self.normal == PCG
 
     def backends(self, dim: int) -> tuple[str, str]:
+        if PCG in (self.normal, self.tangential):
+            if self.normal != PCG or self.tangential not in (PCG, None):
+                raise InputError("the backend 'pcg' solves the normal and the tangential problem; name it for both.")
+            return PCG, PCG
         tangential = self.tangential or ("proxqp" if dim == 2 else "clarabel")
         return find(self.normal, QP).name, find(tangential, QP if dim == 2 else CONIC).name
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)  # columns with normal entries
-        backends = self.backends(problem.dim)
-        normal, tangential = (
-            NormalProblem(backends[0], problem, pushes),
-            TangentialProblem(backends[1], problem, ~pushes),
-        )
+        normal, tangential = self._subproblems(problem, pushes)
         r, multipliers = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        r_n, r_t, multipliers = r[:, 0], r[:, 1:], multipliers.copy()
+        multipliers = multipliers.copy()
         while True:
-            r_n, multipliers[pushes] = normal.solve(r_t, r_n, multipliers)
-            new, multipliers[~pushes] = tangential.solve(r_n, r_t, multipliers)
-            r_t = new + (1 - self.relaxation) * (r_t - new)
-            yield np.concatenate([r_n[:, None], r_t], axis=1), multipliers.copy()
+            r, multipliers[pushes] = normal.solve(r, multipliers)
+            new, multipliers[~pushes] = tangential.solve(r, multipliers)
+            r = new + (1 - self.relaxation) * (r - new)
+            yield r, multipliers.copy()
+
+    def _subproblems(self, problem: InterfaceProblem, pushes: np.ndarray) -> tuple[Any, Any]:
+        _check_friction(problem, ~pushes)
+        normal, tangential = self.backends(problem.dim)
+        if normal == PCG:
+            P = model_of(problem, self.preconditioner)
+            return KrylovSubproblem(problem, P, pushes, True), KrylovSubproblem(problem, P, ~pushes, False)
+        return NormalProblem(normal, problem, pushes), TangentialProblem(tangential, problem, ~pushes)
+
+
+def _check_friction(problem: InterfaceProblem, tangential: np.ndarray) -> None:
+    if tangential.any() and not np.any(problem.mu > 0):
+        raise InputError("a plate that moves tangentially needs friction to hold it, but mu = 0.")
 
 
 def _index(k: int, dim: int, normal: bool) -> np.ndarray:
@@ -78,14 +105,15 @@ class NormalProblem:
         self.qp = BoxQP.using(backend, self.Q, self.V.T)
         self.low = np.full(problem.contacts, -np.inf if problem.bilateral else 0.0)
 
-    def solve(self, r_t: np.ndarray, r_n: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """r_n (k,) and the multipliers of this problem's balance rows."""
+    def solve(self, r: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """r (k, dim) with new r_n, and the multipliers of this problem's balance rows."""
+        r_n, r_t = split(r)
         c = self.problem.q[:, 0] + self.Q_nt @ r_t.ravel() + self.V_other @ multipliers[~self.columns]
         s = self.problem.s[self.columns] + self.V_t.T @ r_t.ravel()
         project = whole_line_derivative if self.problem.bilateral else half_line_derivative
         tries = attempts(self.qp, lambda qp: qp.solve(c, -s, self.low, np.full(len(c), np.inf), start=r_n))
-        r, lam = certified(tries, Equations(self.Q, c[:, None], self.V, s, project))
-        return r[:, 0], lam
+        new, lam = certified(tries, Equations(self.Q, c[:, None], self.V, s, project))
+        return np.concatenate([new, r_t], axis=1), lam
 
 
 class TangentialProblem:
@@ -97,16 +125,15 @@ class TangentialProblem:
         self.Q, self.Q_tn = problem.Q[np.ix_(t, t)], problem.Q[np.ix_(t, n)]
         self.V, self.V_n, self.V_other = problem.V[t][:, columns], problem.V[n][:, columns], problem.V[t][:, ~columns]
         self.active = bool(np.any(problem.mu > 0))
-        if not self.active and columns.any():
-            raise InputError("a plate that moves tangentially needs friction to hold it, but mu = 0.")
         if self.active:
             bridge = BoxQP if problem.dim == 2 else DiscSOCP
             self.solver = bridge.using(backend, self.Q, self.V.T)
 
-    def solve(self, r_n: np.ndarray, r_t: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """r_t (k, dim - 1) and the multipliers of this problem's balance rows."""
+    def solve(self, r: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """r (k, dim) with new r_t, and the multipliers of this problem's balance rows."""
+        r_n, r_t = split(r)
         if not self.active:
-            return np.zeros_like(r_t), np.zeros(0)
+            return np.concatenate([r_n[:, None], np.zeros_like(r_t)], axis=1), np.zeros(0)
         c = self.problem.q[:, 1:].ravel() + self.Q_tn @ r_n + self.V_other @ multipliers[~self.columns]
         s = self.problem.s[self.columns] + self.V_n.T @ r_n
         radius = self.problem.mu * np.abs(r_n)
@@ -115,4 +142,5 @@ class TangentialProblem:
         else:
             tries = attempts(self.solver, lambda socp: socp.solve(c, -s, radius))
         discs = Equations(self.Q, c.reshape(r_t.shape), self.V, s, lambda y: disc_derivative(y, radius))
-        return certified(tries, discs)
+        new, lam = certified(tries, discs)
+        return np.concatenate([r_n[:, None], new], axis=1), lam

@@ -18,11 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from contactopt.methods import NATIVE, Iterate
 from contactopt.methods.auto import Auto
+from contactopt.operators import shifted
 from contactopt.problem import InterfaceProblem, natural_map_residual
 from contactopt.scene import check_number
 
@@ -38,6 +40,7 @@ class Penalty:
 
     factor: float = 1e6
     tangential_factor: float | None = None
+    implicit: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_number("the penalty factor", self.factor, low=0.0)
@@ -61,4 +64,4 @@ class Penalty:
         added[:, 0] = 1 / self.factor
         if self.tangential_factor is not None:
             added[:, 1:] = 1 / self.tangential_factor
-        return replace(problem, Q=problem.Q + np.diag(added.ravel()))
+        return replace(problem, Q=shifted(problem.Q, added.ravel()))

@@ -1,0 +1,195 @@
+"""Everything that solves from products with Q alone: operators, Newton steps, subproblems, nested meshes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, reduce_bodies, run, scenes, solve
+from contactopt.krylov import krylov_step, model_of
+from contactopt.linear import SuperLUSolver
+from contactopt.methods.newton import coulomb_equations
+from contactopt.operators import InterfaceOperator, block, estimate_diagonal, nodal_weights
+from contactopt.problem import dimensionless
+from contactopt.reduction import form_of
+from contactopt.scenes import make_scene
+from contactopt.subproblems import KrylovSubproblem
+
+SMALL = {"punch-2d": 16, "sphere": 12, "punch-3d": 4}
+
+
+def forms(name, **changes):
+    scene = make_scene(name, elements=SMALL[name], **changes)
+    return reduce(scene, Q="explicit"), reduce(scene, Q="implicit")
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_both_forms_are_the_same_operator_with_the_same_blocks(name):
+    explicit, implicit = forms(name)
+    Q, operator = explicit.Q, implicit.Q
+    assert isinstance(Q, np.ndarray) and isinstance(operator, InterfaceOperator)
+    tolerance = 1e-11 * np.abs(Q).max()
+    n, dim = len(Q), explicit.dim
+    assert np.abs(operator @ np.eye(n) - Q).max() < tolerance
+    assert np.abs(operator.to_dense() - Q).max() < tolerance
+    active = np.flatnonzero(np.random.default_rng(0).random(n) < 0.4)
+    for unknowns in (np.arange(0, n, dim), np.setdiff1d(np.arange(n), np.arange(0, n, dim)), active):
+        part = block(operator, unknowns)
+        assert np.abs(part @ np.eye(len(unknowns)) - Q[np.ix_(unknowns, unknowns)]).max() < tolerance
+        assert np.abs(part.to_dense() - Q[np.ix_(unknowns, unknowns)]).max() < tolerance
+    normal, tangential = np.arange(0, n, dim), np.arange(1, n, dim)
+    coupling = (operator @ np.eye(n)[:, tangential])[normal]
+    assert np.abs(coupling - Q[np.ix_(normal, tangential)]).max() < tolerance
+    for mine, other in ((explicit.q, implicit.q), (explicit.V, implicit.V), (explicit.s, implicit.s)):
+        assert np.array_equal(mine, other)
+
+
+def test_products_are_counted_once():
+    _, implicit = forms("punch-2d")
+    before = implicit.Q.products
+    implicit.Q @ np.zeros(implicit.Q.shape[0])
+    implicit.Q @ np.zeros((implicit.Q.shape[0], 3))
+    block(implicit.Q, np.arange(4)) @ np.zeros(4)
+    assert implicit.Q.products - before == 5
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_estimated_diagonal_is_near_the_true_one_and_zero_where_nothing_moves(name):
+    explicit, implicit = forms(name)
+    true, estimate = np.diag(explicit.Q), implicit.Q.diagonal
+    assert np.array_equal(estimate == 0, true == 0)
+    ratio = estimate[true > 0] / true[true > 0]
+    assert ratio.min() > 0.2 and ratio.max() < 5
+
+
+def test_trace_of_a_diagonal_operator_is_exact():
+    d = np.array([1.0, 2.0, 3.0, 0.0])
+    estimate = estimate_diagonal(lambda X, accuracy: d[:, None] * X, np.ones(2), d > 0)
+    assert estimate.sum() == pytest.approx(6.0) and estimate[3] == 0
+
+
+def test_nodal_weights_of_even_nodes_are_even():
+    x = np.linspace(0, 1, 5)
+    areas = np.array([0.5, 1, 1, 1, 0.5])
+    assert np.allclose(nodal_weights(x[None], areas, 2), 1.0)
+    order = [3, 1, 4, 0, 2]
+    assert np.allclose(nodal_weights(x[None, order], areas[order], 2), 1.0)
+
+
+@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("method", ["auto", "newton"])
+def test_answers_do_not_depend_on_the_form(name, method):
+    explicit, implicit = forms(name, mu=0.3)
+    a, b = solve(explicit, method, tol=1e-11), solve(implicit, method, tol=1e-11)
+    assert a.solved and b.solved and natural_map_residual(explicit, b.reactions, b.multipliers) < 1e-10
+    assert np.allclose(a.reactions, b.reactions, atol=1e-8 * np.abs(a.reactions).max())
+    assert a.products == 0 < b.products <= 90
+    counts = [entry["products"] for entry in b.history]
+    assert counts == sorted(counts) and counts[-1] == b.products
+
+
+@pytest.mark.parametrize("preconditioner", ["p21", "p22", "neumann", "none"])
+def test_every_preconditioner_leads_to_the_same_answer(preconditioner):
+    explicit, implicit = forms("punch-2d", mu=0.3)
+    reference = solve(explicit, tol=1e-11).reactions
+    for method, settings in (("newton", {}), ("alternating", {"normal": "pcg"})):
+        solution = solve(implicit, method, tol=1e-8, preconditioner=preconditioner, **settings)
+        assert solution.solved and np.allclose(solution.reactions, reference, atol=1e-5 * np.abs(reference).max())
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_a_krylov_step_is_the_dense_step(symmetric):
+    """Random D with open, sticking, slipping contacts and everything between; two multipliers."""
+    random = np.random.default_rng(3)
+    k, d, p = 12, 3, 2
+    B = random.normal(size=(k * d, k * d))
+    Q, V = B @ B.T / (k * d) + np.eye(k * d), random.normal(size=(k * d, p))
+    problem = InterfaceProblem(Q, random.normal(size=(k, d)), 0.5, V, random.normal(size=p))
+    equations = coulomb_equations(problem)
+    R = random.normal(size=(k, d, d))
+    basis = np.linalg.qr(R)[0]
+    D = basis @ (random.random((k, d, 1)) * basis.transpose(0, 2, 1))
+    D = (D + D.transpose(0, 2, 1)) / 2 if symmetric else D + 0.1 * R
+    D[:3], D[3:6] = 0.0, np.eye(d)
+    error, balance = random.normal(size=(k, d)), random.normal(size=p)
+    expected = equations.step(error, balance, D, ridge=0.0)
+    for name in ("neumann", "none"):
+        got = krylov_step(equations, model_of(problem, name if name == "none" else None), error, balance, D, 1e-12)
+        for a, b in zip(got, expected):
+            assert np.allclose(a, b, atol=1e-8)
+
+
+@pytest.mark.parametrize("bilateral", [False, True])
+def test_subproblems_meet_their_conditions(bilateral):
+    problem, _ = dimensionless(forms("punch-3d", mu=0.2, bilateral=bilateral)[1])
+    P, all_ = model_of(problem), np.ones(1, dtype=bool)
+    r, lam = KrylovSubproblem(problem, P, all_, True).solve(np.zeros(problem.q.shape), np.zeros(1))
+    u = problem.displacements(r, lam)
+    assert np.abs(problem.V.T @ r.ravel() + problem.s).max() < 1e-8
+    assert np.abs(u[:, 0] if bilateral else np.minimum(u[:, 0], r[:, 0])).max() < 1e-7
+    r, _ = KrylovSubproblem(problem, P, ~all_, False).solve(r, lam)
+    bound, size = problem.mu * np.abs(r[:, 0]), np.linalg.norm(r[:, 1:], axis=1)
+    u = problem.displacements(r, lam)[:, 1:]
+    assert np.all(size <= bound * (1 + 1e-9) + 1e-9)
+    sticks = size < 0.999 * bound
+    assert sticks.any() and not sticks.all() and np.abs(u[sticks]).max() < 1e-7
+    slips = ~sticks & (np.linalg.norm(u, axis=1) > 1e-6)
+    turned = u[slips] / np.linalg.norm(u[slips], axis=1)[:, None] + r[slips, 1:] / size[slips, None]
+    assert slips.any() and np.abs(turned).max() < 1e-5
+
+
+def test_penalty_takes_products_too():
+    explicit, implicit = forms("punch-2d")
+    a, b = (solve(problem, "penalty", factor=1e7) for problem in (explicit, implicit))
+    assert b.products > 0 and np.allclose(a.reactions, b.reactions, atol=1e-5 * np.abs(a.reactions).max())
+
+
+def test_auto_falls_back_on_the_entries_of_Q():
+    """Strong friction, where Newton's method needs the rest of the chain: an operator must not stop it."""
+    explicit, _ = forms("punch-2d", mu=5.0)
+    wrapped = InterfaceOperator(lambda X, accuracy: explicit.Q @ X, np.diag(explicit.Q).copy())
+    problem = InterfaceProblem(
+        wrapped, explicit.q, explicit.mu, explicit.V, explicit.s, explicit.areas, explicit.coordinates
+    )
+    assert solve(problem).solved
+    assert solve(problem, "nsgs", max_iterations=3).iterations == 3  # methods without products get the entries
+
+
+def test_the_form_is_chosen_by_cost():
+    assert (
+        form_of(200, False) == "explicit" and form_of(20_000, False) == "implicit" and form_of(200, True) == "implicit"
+    )
+    with pytest.raises(InputError, match="choose from auto, explicit, implicit"):
+        reduce(scenes.flat_punch(2, elements=4), Q="dense")
+
+
+def test_iterative_bodies_start_from_nested_meshes(tmp_path):
+    pytest.importorskip("pyamg")
+    direct, iterative = (run("punch-3d", elements=8, solver=solver) for solver in ("superlu", "multigrid"))
+    assert iterative.solution.solved and "coarse" in iterative.solution.seconds
+    assert iterative.summary["q"] == "implicit" and direct.summary["q"] == "explicit"
+    assert np.allclose(iterative.solution.reactions, direct.solution.reactions, atol=1e-6 * 100)
+
+
+def test_trailing_product_needs_no_interior():
+    reduction = reduce_bodies(scenes.flat_punch(2, elements=6))
+    body = reduction.bodies[0]
+    assert isinstance(body.solver, SuperLUSolver) and body.solver.trailing_triangle is not None
+    force = np.random.default_rng(0).normal(size=len(body.interface))
+    assert np.allclose(body.solver.trailing_product(force), body.compliance @ force, rtol=1e-11)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_loaded_reduction_equals_a_new_one(dim):
+    first = reduce_bodies(scenes.flat_punch(dim, elements=4))
+    other = scenes.flat_punch(dim, elements=4, force=250.0, mu=0.2)
+    again, anew = first.loaded(other).problem, reduce(other)
+    for a, b in ((again.q, anew.q), (again.s, anew.s), (again.V, anew.V), (again.mu, anew.mu)):
+        assert np.allclose(a, b, atol=1e-11 * max(1.0, np.abs(b).max()))
+    with pytest.raises(InputError, match="hold other unknowns than before"):
+        first.loaded(replace(other, upper=replace(other.upper, supports=())))
+
+
+def test_preconditioner_and_explicit_Q_exclude_each_other():
+    with pytest.raises(InputError, match="drop one of them"):
+        run("punch-2d", Q="explicit", preconditioner="p21")
