@@ -37,6 +37,10 @@ from contactopt.problem import InterfaceProblem
 Product = Callable[[np.ndarray], np.ndarray]  # acts on arrays (*shape, dim)
 
 INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
+SPLIT, SOFT = (
+    0.3,
+    0.28,
+)  # Poisson's ratio of the model; what bilinear elements add, read off Q (preconditioner_conditions)
 ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an active set
 
 
@@ -121,7 +125,7 @@ def neumann(grid: Grid) -> tuple[Product, Product]:
 
     Its zero, the constants, is half the smallest other value.
     """
-    parts = [_root(grid, held) for held in grid.held]
+    parts = [_root(grid, component) for component in range(len(grid.held))]
 
     def along(power: float) -> Product:
         def product(X: np.ndarray) -> np.ndarray:
@@ -150,14 +154,23 @@ TRANSFORMS = {
 }
 
 
-def _root(grid: Grid, held: np.ndarray) -> tuple[np.ndarray, list]:
-    """Square root of the symbol, and the transform along each direction, of a component held as given."""
-    chosen = [TRANSFORMS[bool(first), bool(last)] for first, last in held]
-    squares = np.zeros(grid.shape)
-    for axis, (k, (*_, shift)) in enumerate(zip(grid.shape, chosen)):
-        line = 4 * np.sin(np.pi * (np.arange(k) + shift) / (2 * k)) ** 2
-        squares += (line * grid.aspect ** (1 - 2 * axis)).reshape([-1 if i == axis else 1 for i in range(squares.ndim)])
+def _root(grid: Grid, component: int) -> tuple[np.ndarray, list]:
+    """Square root of the symbol of a component, and its transform along each direction.
+
+    The Laplacian is that of bilinear elements. A half-space gives way differently to tangential tractions that vary along
+    their own direction and across it, by 1 - nu to 1, and elements more so the shorter the wave (SPLIT, SOFT).
+    """
+    chosen = [TRANSFORMS[bool(first), bool(last)] for first, last in grid.held[component]]
+    lines = [4 * np.sin(np.pi * (np.arange(k) + t[3]) / (2 * k)) ** 2 for k, t in zip(grid.shape, chosen)]
+    waves = np.meshgrid(*lines, indexing="ij")
+    squares = waves[0].copy()
+    if len(waves) == 2:
+        x, y, a = *waves, grid.aspect
+        squares = a * x + y / a - (a + 1 / a) * x * y / 6
     root = np.sqrt(squares)
+    if 0 < component <= len(waves):
+        own, total = waves[component - 1], np.maximum(sum(waves), 1e-300)
+        root /= 1 - own / total * ((SPLIT if len(waves) == 2 else 0.0) + SOFT * own / 4)
     if root.flat[0] == 0:
         root.flat[0] = np.sort(root.ravel())[1] / 2
     return root, [transform[:3] for transform in chosen]
