@@ -40,7 +40,7 @@ class ReducedBody:
 
     @property
     def compliance(self) -> np.ndarray:
-        """(m, m) block of A_ff^-1 on `interface` [length / force]."""
+        """(m, m) block of A_ff^-1 on `interface` [length / force]; InputError if it was not provided for (schur)."""
         return self.solver.trailing_inverse()
 
     @cached_property
@@ -61,7 +61,9 @@ class ReducedBody:
         return out
 
     def contact_motion(self, force: np.ndarray, accuracy: float | None = None) -> np.ndarray:
-        """As elastic() under forces on the interface alone, right there and zero elsewhere; cheaper."""
+        """As elastic() under forces on the interface alone, right there and, where it is cheaper, zero elsewhere."""
+        if self.solver.last is None:
+            return self.elastic(force, accuracy)
         out = np.zeros(force.shape)
         out[self.interface] = self.solver.trailing_product(force[self.interface], accuracy)
         if self.soft.shape[1]:
@@ -73,15 +75,19 @@ class ReducedBody:
         return np.asarray(self.at_rest + self.elastic(force) + self.motions @ multipliers)
 
 
-def reduce_body(body: Body, solver: str = "auto") -> ReducedBody:
-    """Make one body's linear system solvable and condense its plates."""
+def reduce_body(body: Body, solver: str = "auto", schur: bool = True) -> ReducedBody:
+    """Make one body's linear system solvable and condense its plates.
+
+    schur  eliminate the contact unknowns last, so that the factors hold their Schur complement: for an explicit Q
+    """
     dofs, n = np.asarray(body.basis.nodal_dofs), len(body.load)
     node, component, place = np.empty(n, int), np.empty(n, int), np.full(n, -1)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
     place[body.free] = np.arange(len(body.free))
     interface = np.intersect1d(body.contact_dofs, body.free)
     A = body.A[body.free][:, body.free]
-    made = make_solver(solver, A, node[body.free], component[body.free], body.basis.mesh.p, place[interface])
+    last = place[interface] if schur else None
+    made = make_solver(solver, A, node[body.free], component[body.free], body.basis.mesh.p, last)
     extended = body.motion.copy()
     extended[body.free] -= made.solve((body.A @ body.motion)[body.free])
     K = extended.T @ (body.A @ extended)

@@ -34,10 +34,12 @@ class BodySolver(Protocol):
     """Solves A x = b. Different solvers may work in different threads; one solver serves one thread at a time.
 
     name        its name in SOLVERS
+    last        unknowns whose block of the inverse can be asked for, or None
     iterations  conjugate gradient iterations of the last call of `solve`, the most of any column; 0 for factors
     """
 
     name: str
+    last: np.ndarray | None
     iterations: int
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:

@@ -28,11 +28,14 @@ from contactopt.body import build_body, reload_body
 from contactopt.condensation import ReducedBody, loaded_body, reduce_body
 from contactopt.errors import InputError
 from contactopt.interface import match_bodies, positions
+from contactopt.linear import choose
 from contactopt.operators import FORMS, InterfaceOperator, estimate_diagonal, nodal_weights
 from contactopt.problem import InterfaceProblem
 from contactopt.scene import Part, Scene
 
-EXPLICIT = 3000  # interface unknowns up to which Q is formed
+PRODUCTS = 60  # with Q, of a solve from cold
+DENSE = 10  # speed of dense linear algebra over that of a sparse factorisation
+LARGEST = 8000  # interface unknowns of an explicit Q: half a gigabyte
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +130,11 @@ def reduce_bodies(
     seconds["assemble"] = time.perf_counter() - start
 
     start = time.perf_counter()
-    first, second = both(lambda body: None if body is None else reduce_body(body, solver), bodies)
+    largest = max(len(b.free) for b in bodies if b is not None)
+    if Q == "auto":
+        iterative = solver == "multigrid" or (solver == "auto" and choose(largest, scene.dim) == "multigrid")
+        Q = form_of(len(gap) * scene.dim, largest, scene.dim, iterative)
+    first, second = both(lambda b: None if b is None else reduce_body(b, solver, Q == "explicit"), bodies)
     seconds["factorise"] = time.perf_counter() - start
 
     start = time.perf_counter()
@@ -135,10 +142,9 @@ def reduce_bodies(
     maps = _maps(reduced, nodes, frames)
     points = positions(bodies, nodes)
     operator = _operator(reduced, maps, nodal_weights(points, areas, scene.dim))
-    form = form_of(operator.shape[0], any(b.solver.name == "multigrid" for b in reduced if b)) if Q == "auto" else Q
     q, V, s, plates = _linear_terms(scene, reduced, maps, frames, gap)
     problem = InterfaceProblem(
-        operator if form == "implicit" else operator.to_dense(),
+        operator if Q == "implicit" else operator.to_dense(),
         q,
         np.full(len(gap), float(scene.mu)),
         V,
@@ -151,14 +157,18 @@ def reduce_bodies(
     return Reduction(scene, problem, reduced, nodes, frames, gap, plates, seconds)
 
 
-def form_of(unknowns: int, iterative: bool) -> str:
-    """The cheaper form of Q for that many interface unknowns m, 'explicit' or 'implicit'.
+def form_of(m: int, n: int, dim: int, iterative: bool) -> str:
+    """The cheaper form of Q: 'explicit' or 'implicit', from counts of operations.
 
-    Explicit: m^3 operations for the inverse of the Schur complement and again for Newton's steps, 8 m^2 bytes a copy.
-    Implicit: some hundred products. With factors of the bodies the two cost the same at about EXPLICIT unknowns
-    (reports/preconditioners); a body solved by iteration would need m solves for an explicit Q, which never pays.
+    m interface unknowns, n unknowns of the larger body, `iterative` if it has no factors.
+    Explicit: m^3 / 3 to eliminate the contact unknowns last, at the speed of a sparse factorisation, and about 3 m^3 for the
+    inverse and Newton's steps at DENSE times that speed. Implicit: PRODUCTS solves of 4 operations per entry of the
+    factors, of which nested dissection leaves 4 n log2 n in 2D and 17 n^(4/3) in 3D (fitted to our bodies). Bodies without
+    factors would need m solves for an explicit Q, which never pays, nor does an array larger than LARGEST.
     """
-    return "implicit" if iterative or unknowns > EXPLICIT else "explicit"
+    explicit = m**3 / 3 + 3 * m**3 / DENSE
+    entries = 4 * n * np.log2(n) if dim == 2 else 17 * n ** (4 / 3)
+    return "implicit" if iterative or m > LARGEST or explicit > 4 * PRODUCTS * entries else "explicit"
 
 
 def both(act: Callable[[Any], Any], bodies: Sequence[Any]) -> tuple[Any, Any]:
@@ -205,7 +215,8 @@ def _operator(
         return terms[0] if len(terms) == 1 else terms[0] + terms[1]
 
     moves = np.any([_moves(T, body) for body, T in pairs if body is not None and T is not None], axis=0)
-    return InterfaceOperator(product, estimate_diagonal(product, weights, moves), entries)
+    complete = all(body is None or body.solver.last is not None for body in bodies)
+    return InterfaceOperator(product, estimate_diagonal(product, weights, moves), entries if complete else None)
 
 
 def _moves(T: sp.csr_matrix, body: ReducedBody) -> np.ndarray:
