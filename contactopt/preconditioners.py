@@ -6,56 +6,31 @@ nodes, is a circulant matrix Q_c (27), the H^1 norm another, L_c (28); with m th
 up to a factor that no iteration sees. P21 resembles S1 + S2; the matrix that P22 inverts resembles Q itself. In 3D
 the sum of P21 along both directions of the contact surface is P31 (29). Extension by zero belongs to functions that
 vanish at the ends (H00^1/2), which a traction at a free edge does not:
-    `neumann`, the square root of the Laplacian of the contact line or surface by cosine transforms (sine transforms for
-    components that a plane of symmetry or an axis holds at that end),
+    `neumann`, the square root of the Laplacian of the contact line or surface by cosine transforms (contactopt.cosine),
 needs no extension. Each acts on every component by itself. What is left are a few smooth motions of the two bodies against
 each other, first of all the sway of a slender body: `deflated` solves for them exactly (balancing, Mandel 1993).
 
 Restriction to an active set A: the paper takes the rows and columns A of P. Where P = G^-1 with a cheap product G, which
 `neumann` has, deflated or not, G_AA is the better model: c1 G <= Q <= c2 G holds on every subspace with the same constants,
 so that (G_AA)^-1, by an inner PCG that needs no body, has the condition number of P on any active set (`restricted`).
-
-Contacts lie on a line or on the points of a rectangular grid. Spacing may vary: in terms of nodal forces the kernel of Q is
-log |x_i - x_j| on a line, a function of the node numbers up to smooth terms, and 1 / |x_i - x_j| on a surface, where the
-fourth root of the nodal area on both sides takes the change of scale out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.fft import dct, dst, idct, idst, irfft, rfft
+from scipy.fft import irfft, rfft
 from scipy.sparse.linalg import LinearOperator, cg
 
+from contactopt.cosine import Grid, Product, grid_of, neumann
 from contactopt.errors import InputError
-from contactopt.operators import Interface, diagonal, held, nodal_weights
+from contactopt.operators import Interface, diagonal, held
 from contactopt.problem import InterfaceProblem
 
-Product = Callable[[np.ndarray], np.ndarray]  # acts on arrays (*shape, dim)
-
 INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
-SPLIT, SOFT = (
-    0.3,
-    0.28,
-)  # Poisson's ratio of the model; what bilinear elements add, read off Q (preconditioner_conditions)
 ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an active set
-
-
-@dataclass(frozen=True)
-class Grid:
-    """Contacts on a line or a rectangular grid.
-
-    shape    contacts along each direction
-    aspect   mean spacing along the second direction over that along the first; 1 on a line
-    held     (dim, directions, 2): component does not move at the first / last contact of that direction
-    """
-
-    shape: tuple[int, ...]
-    aspect: float
-    held: np.ndarray
 
 
 class Preconditioner(LinearOperator):
@@ -120,62 +95,6 @@ def p22(grid: Grid) -> tuple[Product, Product]:
     return solve, product
 
 
-def neumann(grid: Grid) -> tuple[Product, Product]:
-    """Square root of the Laplacian of the cells, even at free ends, odd at ends where a component is held.
-
-    Its zero, the constants, is half the smallest other value.
-    """
-    parts = [_root(grid, component) for component in range(len(grid.held))]
-
-    def along(power: float) -> Product:
-        def product(X: np.ndarray) -> np.ndarray:
-            out = np.empty(X.shape)
-            for i, (root, transforms) in enumerate(parts):
-                x = X[..., i]
-                for axis, (forward, _, kind) in enumerate(transforms):
-                    x = forward(x, type=kind, axis=axis, norm="ortho")
-                x = root**power * x
-                for axis, (_, backward, kind) in enumerate(transforms):
-                    x = backward(x, type=kind, axis=axis, norm="ortho")
-                out[..., i] = x
-            return out
-
-        return product
-
-    return along(1.0), along(-1.0)
-
-
-# held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j + shift) / k
-TRANSFORMS = {
-    (False, False): (dct, idct, 2, 0.0),
-    (True, False): (dst, idst, 4, 0.5),
-    (False, True): (dct, idct, 4, 0.5),
-    (True, True): (dst, idst, 2, 1.0),
-}
-
-
-def _root(grid: Grid, component: int) -> tuple[np.ndarray, list]:
-    """Square root of the symbol of a component, and its transform along each direction.
-
-    The Laplacian is that of bilinear elements. A half-space gives way differently to tangential tractions that vary along
-    their own direction and across it, by 1 - nu to 1, and elements more so the shorter the wave (SPLIT, SOFT).
-    """
-    chosen = [TRANSFORMS[bool(first), bool(last)] for first, last in grid.held[component]]
-    lines = [4 * np.sin(np.pi * (np.arange(k) + t[3]) / (2 * k)) ** 2 for k, t in zip(grid.shape, chosen)]
-    waves = np.meshgrid(*lines, indexing="ij")
-    squares = waves[0].copy()
-    if len(waves) == 2:
-        x, y, a = *waves, grid.aspect
-        squares = a * x + y / a - (a + 1 / a) * x * y / 6
-    root = np.sqrt(squares)
-    if 0 < component <= len(waves):
-        own, total = waves[component - 1], np.maximum(sum(waves), 1e-300)
-        root /= 1 - own / total * ((SPLIT if len(waves) == 2 else 0.0) + SOFT * own / 4)
-    if root.flat[0] == 0:
-        root.flat[0] = np.sort(root.ravel())[1] / 2
-    return root, [transform[:3] for transform in chosen]
-
-
 # name -> (function of the grid of contacts giving P and, where it is cheap, P^-1, what it is)
 PRECONDITIONERS: dict[str, tuple[Callable[[Grid], tuple[Product, Product | None]], str]] = {
     "p21": (p21, "circulant H^1/2 seminorm, extended by zero (paper, eqs (25) and, in 3D, (29))"),
@@ -193,29 +112,26 @@ def find_preconditioner(name: str | None) -> None:
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
     """The named approximate inverse of problem.Q, (k dim, k dim).
 
-    `neumann` is weighted by nodal_weights. Uses of Q only its mean diagonal and which components cannot move.
+    Uses of Q only its mean diagonal and which components cannot move.
     Raises InputError for an unknown name, fewer than 3 contacts a side, or contacts not on a line or rectangular grid.
     """
     find_preconditioner(name)
     still = held(problem.Q)
     mean = float(np.mean(diagonal(problem.Q)[~still])) if not still.all() else 1.0
-    grid, order = _grid(problem, still.reshape(problem.q.shape))
+    grid, order = grid_of(problem, still.reshape(problem.q.shape))
     product, inverse = PRECONDITIONERS[name][0](grid)
-    weight = np.ones((problem.contacts, 1))
-    if name == "neumann":
-        weight = nodal_weights(problem.coordinates, problem.areas, problem.dim)[:, None]
 
-    def on_grid(act: Product, w: np.ndarray, factor: float) -> Product:
+    def on_grid(act: Product, factor: float) -> Product:
         def apply(x: np.ndarray) -> np.ndarray:
-            sorted_ = (w * np.where(still, 0.0, x).reshape(problem.q.shape))[order]
+            sorted_ = np.where(still, 0.0, x).reshape(problem.q.shape)[order]
             out = np.empty(problem.q.shape)
             out[order] = act(sorted_.reshape(*grid.shape, problem.dim)).reshape(problem.q.shape)
-            return np.where(still, x, (factor * w * out).ravel())  # what cannot move is on its own
+            return np.where(still, x, factor * out.ravel())  # what cannot move is on its own
 
         return apply
 
-    model = None if inverse is None else on_grid(inverse, 1 / weight, mean)
-    return Preconditioner(problem.q.size, on_grid(product, weight, 1 / mean), model)
+    model = None if inverse is None else on_grid(inverse, mean)
+    return Preconditioner(problem.q.size, on_grid(product, 1 / mean), model)
 
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
@@ -294,28 +210,3 @@ def _restricted(symbol: np.ndarray, k: int, axis: int) -> Product:
         return np.moveaxis(irfft(symbol * rfft(lines, n=n), n=n)[..., :k], -1, axis)
 
     return product
-
-
-def _grid(problem: InterfaceProblem, still: np.ndarray) -> tuple[Grid, np.ndarray]:
-    """The grid of the contacts, and the order of the contacts in it; still (k, dim) masks components that cannot move."""
-    x = problem.coordinates[: problem.dim - 1]
-    size = np.ptp(problem.coordinates, axis=1).max(initial=0.0)
-    ticks, places = [], []
-    for row in x:
-        order = np.argsort(row)
-        starts = np.concatenate([[True], np.diff(row[order]) > 1e-6 * size])
-        place = np.empty(len(row), dtype=int)
-        place[order] = np.cumsum(starts) - 1
-        ticks.append(row[order][starts])
-        places.append(place)
-    shape = tuple(len(t) for t in ticks)
-    order = np.lexsort(places[::-1])
-    full = min(shape) > 2 and np.prod(shape) == problem.contacts
-    if not full or np.any(np.diff(np.ravel_multi_index(places, shape)[order]) != 1):
-        raise InputError("the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a side.")
-    lengths = [np.ptp(t) / (len(t) - 1) for t in ticks]
-    aspect = lengths[1] / lengths[0] if len(lengths) > 1 else 1.0
-    on_grid = still[order].reshape(*shape, problem.dim)
-    across = tuple(range(len(shape) - 1))
-    ends = [[on_grid.take(end, axis).all(axis=across) for end in (0, -1)] for axis in range(len(shape))]
-    return Grid(shape, float(aspect), np.moveaxis(np.array(ends), 2, 0)), order

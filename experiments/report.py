@@ -30,8 +30,15 @@ def markdown(rows: list[dict[str, Any]]) -> str:
     return "\n".join(lines + ["| " + " | ".join(text(row[h]) for h in head) + " |" for row in rows])
 
 
-def write(name: str, title: str, text: str, tables: dict[str, list[dict[str, Any]]], figures: dict[str, Any]) -> None:
-    """Write reports/name/. `text` is Markdown in which {table} stands for the table of that name."""
+def write(
+    name: str,
+    title: str,
+    text: str,
+    tables: dict[str, list[dict[str, Any]]],
+    figures: dict[str, Any],
+    page: str = "{name}/report.md",
+) -> None:
+    """Write reports/name/ and the page. `text` is Markdown in which {table} stands for the table of that name."""
     folder = REPORTS / name
     folder.mkdir(parents=True, exist_ok=True)
     for stem, rows in tables.items():
@@ -43,7 +50,9 @@ def write(name: str, title: str, text: str, tables: dict[str, list[dict[str, Any
     for stem, figure in figures.items():
         figure.savefig(folder / f"{stem}.png", dpi=120)
     body = text.format(**{stem: markdown(rows) for stem, rows in tables.items()})
-    pictures = "\n\n".join(f"![{stem}]({stem}.png)" for stem in figures)
+    path = REPORTS / page.format(name=name)
+    home = os.path.relpath(folder, path.parent)
+    pictures = "\n\n".join(f"![{stem}]({os.path.normpath(f'{home}/{stem}.png')})" for stem in figures)
     foot = f"Made by `python -m experiments.{name}`.\nEnvironment: {environment()}."
-    (folder / "report.md").write_text(f"# {title}\n\n{body}\n\n{pictures}\n\n{foot}\n".replace("\n\n\n\n", "\n\n"))
-    print((folder / "report.md").read_text())
+    path.write_text(f"# {title}\n\n{body}\n\n{pictures}\n\n{foot}\n".replace("\n\n\n\n", "\n\n"))
+    print(path.read_text())

@@ -4,9 +4,9 @@ import scipy.linalg as la
 from scipy.sparse.linalg import cg
 
 from contactopt import InputError, InterfaceProblem, reduce, scenes
+from contactopt.cosine import Grid
 from contactopt.preconditioners import (
     PRECONDITIONERS,
-    Grid,
     deflated,
     norm,
     p21,
@@ -17,7 +17,7 @@ from contactopt.preconditioners import (
     seminorm,
     smooth_motions,
 )
-from experiments.preconditioner_conditions import blocks, condition, solids
+from experiments.preconditioners import blocks, condition, solids
 
 # Condition numbers of the normal block on these bodies, measured on an independent prototype: k -> Q, P21 Q, P22 Q.
 PROTOTYPE = {17: (15.0, 4.67, 6.24), 33: (29.4, 5.84, 6.88), 65: (58.1, 7.12, 7.35)}
@@ -74,7 +74,7 @@ def test_circulants_are_those_of_the_paper(m):
 def test_products_are_those_of_the_dense_matrices(k):
     m = int(2 ** np.ceil(np.log2(k)))
     dense = la.circulant(seminorm(m))[:k, :k]
-    line = Grid((k,), 1.0, np.zeros((2, 1, 2), bool))
+    line = Grid((np.arange(float(k)),), np.zeros((2, 1, 2), bool), np.ones(k))
     assert np.allclose(p21(line)[0](np.eye(k)), dense, atol=1e-13)
     symbol = np.fft.fft(seminorm(m)).real / np.fft.fft(norm(m, 4 / (k - 1))).real
     inner = la.circulant(np.fft.ifft(symbol).real)[:k, :k]

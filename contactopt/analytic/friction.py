@@ -1,0 +1,137 @@
+"""Coulomb friction under growing normal load between dissimilar materials: rigid flat punches and Hertz's geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from contactopt.analytic.normal import (
+    flat_punch_axisymmetric,
+    flat_punch_line,
+    hertz_line,
+    hertz_point,
+    under_punch,
+)
+from contactopt.analytic.panels import ODD
+from contactopt.analytic.reference import Field, Reference, check_beta, check_positive
+from contactopt.analytic.spence import UnitPunch, unit_punch
+from contactopt.scene import check_number
+
+
+def flat_punch_line_friction(force_per_length: float, half_width: float, mu: float, beta: float) -> Reference:
+    """Rigid flat punch pressed on a half-plane with Coulomb friction, from zero load.
+
+    force_per_length [force/length], half_width a [length], mu >= 0 [-], beta as in dundurs [-]: for a rigid punch
+    (1 - 2 nu)/(2 (1 - nu)). Fully coupled equations and sources: contactopt.analytic.spence. c/a within 1e-6; tractions
+    within 1e-5 of themselves, at the edges ~ (a - |x|)^(atan(mu |beta|)/pi - 1/2). Raises InputError out of range.
+    """
+    if not _slips(mu, beta):
+        return _without_slip(flat_punch_line(force_per_length, half_width), mu)
+    check_positive(force_per_length=force_per_length, half_width=half_width)
+    return _flat_punch(unit_punch(mu, abs(beta), False), force_per_length, half_width, 1, beta, None)
+
+
+def flat_punch_axisymmetric_friction(force: float, radius: float, modulus: float, mu: float, beta: float) -> Reference:
+    """Rigid circular flat punch pressed on a half-space with Coulomb friction, from zero load.
+
+    force [force], radius a [length], modulus E* [stress]; mu, beta and accuracy as in flat_punch_line_friction.
+    """
+    if not _slips(mu, beta):
+        return _without_slip(flat_punch_axisymmetric(force, radius, modulus), mu)
+    check_positive(force=force, radius=radius, modulus=modulus)
+    punch = unit_punch(mu, abs(beta), True)
+    return _flat_punch(punch, force, radius, 2, beta, punch.approach * force / (radius * modulus))
+
+
+def hertz_line_friction(force_per_length: float, radius: float, modulus: float, mu: float, beta: float) -> Reference:
+    """Cylinder on a half-plane of another material, Coulomb friction, growing load.
+
+    While the load grows by dP the contact is that of a rigid flat punch of its present half-width a, so that
+        p(x) = int_|x|^a p_punch(x; a') dP/da' da', dP/da' ~ a', and q alike,
+    with the punch's c/a; a follows from the slope -x/R of the surface. force_per_length [force/length], radius R
+    [length], modulus E* [stress], mu >= 0 and beta as in contact_modulus and dundurs [-]. Valid for a << R and a load
+    that never fell. Source: Spence (1975), J. Elasticity 5, 297-319. Raises InputError out of range.
+    """
+    if not _slips(mu, beta):
+        return _without_slip(hertz_line(force_per_length, radius, modulus), mu)
+    check_positive(force_per_length=force_per_length, radius=radius, modulus=modulus)
+    punch = unit_punch(mu, abs(beta), False)
+    v, weights = punch.panels.v, punch.panels.weights
+    # slope of the gap x/R = 2 kappa x J / E* for P = kappa a^2 / 2 with J = int_1^inf H p(t) / t^2 dt of the unit punch
+    slope = 2 / np.pi * weights @ (punch.p * _log_cosh(v) * np.cosh(v) / np.sinh(v) ** 2)
+    a = float(np.sqrt(4 * force_per_length * radius * slope / modulus))
+    return _round(punch, 2 * force_per_length / a, a, beta, None)
+
+
+def hertz_point_friction(force: float, radius: float, modulus: float, mu: float, beta: float) -> Reference:
+    """Sphere on a half-space of another material, Coulomb friction, growing load.
+
+    As hertz_line_friction with dP/da' ~ a'^2; a and the approach follow from the depth approach - r^2/(2 R) of the
+    surface. force [force].
+    """
+    if not _slips(mu, beta):
+        return _without_slip(hertz_point(force, radius, modulus), mu)
+    check_positive(force=force, radius=radius, modulus=modulus)
+    punch = unit_punch(mu, abs(beta), True)
+    v, weights = punch.panels.v, punch.panels.weights
+    s = np.tanh(v)
+    # displacement outside a unit punch, beta H Q, over that below it, integrated with t^-3 from 1 to infinity
+    moment = (2 * _log_cosh(v) - s**2) / (2 * s**3) / np.cosh(v) ** 2
+    outside = 4 * abs(beta) / (np.pi * punch.approach) * weights @ ((punch.panels.abel(ODD) @ punch.q) * moment)
+    curvature = 1 - 2 * outside
+    a = float((1.5 * punch.approach * force * radius * curvature / modulus) ** (1 / 3))
+    return _round(punch, 3 * force / a**2, a, beta, a**2 / (radius * curvature))
+
+
+def _slips(mu: float, beta: float) -> bool:
+    check_number("the friction coefficient mu", mu, low=0.0, closed=True)
+    check_beta(beta)
+    return mu > 0 and beta != 0
+
+
+def _without_slip(frictionless: Reference, mu: float) -> Reference:
+    """The same pressure, no shear traction: mu = 0, or sticking because the surfaces move alike (beta = 0)."""
+    return replace(
+        frictionless,
+        shear=lambda x: 0 * frictionless.pressure(x),
+        stick_half_width=frictionless.half_width if mu > 0 else 0.0,
+    )
+
+
+def _flat_punch(punch: UnitPunch, force: float, a: float, power: int, beta: float, approach: float | None) -> Reference:
+    sign = np.sign(beta)
+    return Reference(
+        "rigid punch, Coulomb friction",
+        under_punch(lambda v: force * punch.pressure(v), a, power),
+        a,
+        approach=approach,
+        shear=under_punch(lambda v: sign * force * punch.shear(v), a, power, odd=True),
+        stick_half_width=a * punch.stick_ratio,
+    )
+
+
+def _round(punch: UnitPunch, size: float, a: float, beta: float, approach: float | None) -> Reference:
+    def grown(part: Callable[[np.ndarray, np.ndarray], np.ndarray], odd: bool) -> Field:
+        def field(x: np.ndarray) -> np.ndarray:
+            x = np.asarray(x, dtype=float)
+            s = np.minimum(np.abs(x) / a, 1 - 1e-15)
+            value = size * np.maximum(part(s, np.log1p(2 * s / (1 - s)) / 2), 0.0)  # -1e-9 at the very edge
+            return np.where(np.abs(x) < a, np.sign(beta * x) * value if odd else value, 0.0)
+
+        return field
+
+    return Reference(
+        "Hertz geometry, Coulomb friction",
+        grown(punch.grown_pressure, odd=False),
+        a,
+        size * punch.centre[0],
+        approach,
+        grown(punch.grown_shear, odd=True),
+        a * punch.stick_ratio,
+    )
+
+
+def _log_cosh(v: np.ndarray) -> np.ndarray:
+    return np.log1p(np.sinh(v) ** 2) / 2

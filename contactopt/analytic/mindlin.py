@@ -1,0 +1,133 @@
+"""Cattaneo and Mindlin: a constant normal force, then a tangential one that rises, falls and rises again.
+
+Similar materials (beta = 0), so that Hertz's pressure stands. Under a rising load T, x = T/(mu P), c/a = (1 - x)^(1/k)
+with k = 2 for cylinders and 3 for spheres:
+    q = mu p0 [sqrt(1 - r^2/a^2) - (c/a) sqrt(1 - r^2/c^2)], the second term inside c only.
+A reversal adds the same with twice mu and the opposite sign, and a closed loop leaves no trace (Masing's rules). Exact
+in plane strain, and in three dimensions for nu = 0; else the slip is out of line with q by about nu/(4 - 2 nu), which
+is neglected. Sources: Cattaneo (1938), Rend. Accad. Lincei 27; Mindlin (1949), J. Appl. Mech. 16, 259-268; Mindlin and
+Deresiewicz (1953), J. Appl. Mech. 20, 327-344; Johnson (1985), Contact Mechanics, sections 7.2(d), 7.4(a).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from contactopt.analytic.normal import hertz_line, hertz_point
+from contactopt.analytic.reference import Reference, check_positive, ellipse
+from contactopt.errors import InputError
+from contactopt.scene import check_number
+
+
+def hertz_line_tangential(
+    force_per_length: float, radius: float, modulus: float, mu: float, loads: float | Sequence[float]
+) -> Reference:
+    """Cylinders under P and then T [force/length]; E* `modulus` [stress].
+
+    loads  the present T, or the turning points of T so far and the present one; |T| <= mu P
+    The shift is the part that slip adds to that of a full stick, which is linear in T and depends on the bodies: when
+    rising, (mu P/(pi E*)) [(1 - x) ln(1 - x) + x], from the displacement at the centre, Johnson (1985), eq (2.24).
+    Raises InputError if |T| exceeds mu P.
+    """
+    normal = hertz_line(force_per_length, radius, modulus)
+    limit = _limit(mu, force_per_length)
+
+    def rising(x: float) -> float:
+        return limit / (np.pi * modulus) * (x + ((1 - x) * np.log1p(-x) if x < 1 else 0.0))
+
+    return _tangential(normal, mu, limit, loads, 2, rising)
+
+
+def hertz_point_tangential(
+    force: float, radius: float, modulus: float, tangential: float, mu: float, loads: float | Sequence[float]
+) -> Reference:
+    """Spheres under P and then T [force]; E* `modulus` [stress], Gs `tangential` [stress] as in tangential_modulus.
+
+    loads as in hertz_line_tangential. Fields are functions of r. Rising shift: 3 mu P/(16 a Gs) [1 - (1 - x)^(2/3)].
+    """
+    check_positive(tangential_modulus=tangential)
+    normal = hertz_point(force, radius, modulus)
+    limit = _limit(mu, force)
+    full = 3 * limit / (16 * normal.half_width * tangential)
+    return _tangential(normal, mu, limit, loads, 3, lambda x: full * (1 - (1 - x) ** (2 / 3)))
+
+
+def cycle_loss_line(force_per_length: float, modulus: float, mu: float, amplitude: float) -> float:
+    """Energy lost per cycle of T between +-amplitude, cylinders [force]: per length.
+
+    4 mu^2 P^2/(pi E*) [(1 - x) ln(1 - x) + x - x^2/2]: the area of the loop that Masing's rules draw from the shift in
+    hertz_line_tangential. Raises InputError if the amplitude exceeds mu P.
+    """
+    check_positive(force_per_length=force_per_length, modulus=modulus)
+    limit = _limit(mu, force_per_length)
+    x = _share(abs(amplitude), limit)
+    log = (1 - x) * np.log1p(-x) if x < 1 else 0.0
+    return float(4 * limit**2 / (np.pi * modulus) * (log + x - x**2 / 2))
+
+
+def cycle_loss_point(
+    force: float, radius: float, modulus: float, tangential: float, mu: float, amplitude: float
+) -> float:
+    """Energy lost per cycle of T between +-amplitude, spheres [force length].
+
+    9 mu^2 P^2/(10 a Gs) {1 - (1 - x)^(5/3) - (5 x/6) [1 + (1 - x)^(2/3)]}. Arguments as in hertz_point_tangential.
+    Source: Mindlin and Deresiewicz (1953); Johnson (1985), section 7.4. InputError if the amplitude exceeds mu P.
+    """
+    check_positive(tangential_modulus=tangential)
+    a = hertz_point(force, radius, modulus).half_width
+    limit = _limit(mu, force)
+    x = _share(abs(amplitude), limit)
+    brackets = 1 - (1 - x) ** (5 / 3) - 5 * x / 6 * (1 + (1 - x) ** (2 / 3))
+    return float(9 * limit**2 / (10 * a * tangential) * brackets)
+
+
+def masing_branches(loads: Sequence[float]) -> list[tuple[float, float]]:
+    """The history that still counts: (change of load, 1 on the first loading and 2 after a reversal), oldest first."""
+    points = [0.0]
+    for load in loads:
+        if len(points) > 1 and (points[-1] - points[-2]) * (load - points[-1]) >= 0:
+            points.pop()
+        points.append(float(load))
+        while len(points) > 3 and abs(points[-1] - points[-2]) >= abs(points[-2] - points[-3]):
+            del points[-3:-1]  # a closed loop
+        if len(points) > 2 and abs(points[-1]) >= abs(points[1]):
+            del points[1:-1]  # back on the curve of first loading
+    return [(end - start, 1.0 if i == 0 else 2.0) for i, (start, end) in enumerate(pairwise(points))]
+
+
+def _tangential(
+    normal: Reference,
+    mu: float,
+    limit: float,
+    loads: float | Sequence[float],
+    order: int,
+    rising: Callable[[float], float],
+) -> Reference:
+    branches = masing_branches(np.atleast_1d(np.asarray(loads, dtype=float)).tolist())
+    shares = [(np.sign(change) * factor, _share(abs(change) / factor, limit)) for change, factor in branches]
+    a, peak = normal.half_width, mu * (normal.peak or 0.0)
+    stick = [(sign, (1 - x) ** (1 / order)) for sign, x in shares]
+
+    def shear(r: np.ndarray) -> np.ndarray:
+        total = np.zeros(np.shape(r))
+        for sign, ratio in stick:
+            total = total + sign * (ellipse(r, a, peak) - (ellipse(r, ratio * a, ratio * peak) if ratio else 0.0))
+        return total
+
+    shift = float(sum(sign * rising(x) for sign, x in shares))
+    return replace(normal, label="Cattaneo-Mindlin", shear=shear, stick_half_width=a * stick[-1][1], shift=shift)
+
+
+def _limit(mu: float, force: float) -> float:
+    check_number("the friction coefficient mu", mu, low=0.0)
+    return mu * force
+
+
+def _share(load: float, limit: float) -> float:
+    if not load <= limit * (1 + 1e-12):
+        raise InputError(f"the tangential load {load:g} exceeds mu times the normal load, {limit:g}: the bodies slide.")
+    return min(load / limit, 1.0)

@@ -1,0 +1,94 @@
+"""What exact solutions have in common: the record of one, the elastic constants of a pair of bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactopt.errors import InputError
+from contactopt.scene import Material, check_number
+
+Field = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a scene is compared with.
+
+    pressure    position from the centre (k,) [length] -> contact pressure (k,) [stress]; nan under a punch's edge and
+                beyond, where it is infinite or there is no contact
+    half_width  of the contact zone [length]
+    peak        largest pressure [stress], None where it is infinite
+    approach    of the two bodies [length], None where it depends on their size
+    shear       like pressure: traction on the lower body [stress]. Under normal load it points away from the centre
+                (positive at x > 0), under a tangential load in the direction of that load. None: there is none
+    stick_half_width  of the zone without slip [length], None: no friction
+    shift       of the two bodies along a tangential load [length], None without one
+    """
+
+    label: str
+    pressure: Field
+    half_width: float
+    peak: float | None = None
+    approach: float | None = None
+    shear: Field | None = None
+    stick_half_width: float | None = None
+    shift: float | None = None
+
+
+def contact_modulus(first: Material | None, second: Material | None = None) -> float:
+    """E* with 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 [stress]; None is a rigid body.
+
+    Source: Johnson (1985), Contact Mechanics, section 4.2. Raises InputError if both bodies are rigid.
+    """
+    return 1 / sum((1 - m.nu**2) / m.E for m in _elastic(first, second))
+
+
+def tangential_modulus(first: Material | None, second: Material | None = None) -> float:
+    """Gs with 1/Gs = (2 - nu1)/G1 + (2 - nu2)/G2 [stress]; None is a rigid body.
+
+    A circular contact of radius a without slip has the tangential stiffness 8 a Gs. Source: Johnson (1985), section
+    7.2. Raises InputError if both bodies are rigid.
+    """
+    return 1 / sum((2 - m.nu) * 2 * (1 + m.nu) / m.E for m in _elastic(first, second))
+
+
+def dundurs(upper: Material | None, lower: Material | None) -> tuple[float, float]:
+    """Dundurs' constants (alpha, beta) [-] of two bodies in plane strain; None is a rigid body.
+
+    alpha = (A2 - A1)/(A2 + A1), beta = (B2 - B1)/(A2 + A1) with A = (1 - nu)/G, B = (1 - 2 nu)/(2 G): zero for equal
+    materials, positive where the upper body is the stiffer. A rigid upper body has alpha = 1 and
+    beta = (1 - 2 nu)/(2 (1 - nu)). |alpha| <= 1, |beta| <= 1/2 for nu >= 0. Source: Dundurs (1969), J. Appl. Mech. 36,
+    650-652; Johnson (1985), section 5.1, has beta with the opposite sign. Raises InputError if both bodies are rigid.
+    """
+    _elastic(upper, lower)
+    compliance = [0.0 if m is None else 2 * (1 + m.nu) / m.E for m in (upper, lower)]
+    nu = [0.0 if m is None else m.nu for m in (upper, lower)]
+    A1, A2 = ((1 - n) * c for n, c in zip(nu, compliance))
+    B1, B2 = ((0.5 - n) * c for n, c in zip(nu, compliance))
+    return (A2 - A1) / (A2 + A1), (B2 - B1) / (A2 + A1)
+
+
+def ellipse(x: np.ndarray, a: float, peak: float) -> np.ndarray:
+    """peak sqrt(1 - x^2 / a^2), zero outside."""
+    return np.asarray(peak * np.sqrt(np.maximum(0.0, 1 - np.square(np.asarray(x) / a))))
+
+
+def check_positive(**values: float) -> None:
+    """Raise InputError unless every value is a positive finite number."""
+    for name, value in values.items():
+        check_number(name.replace("_", " "), value, low=0.0)
+
+
+def check_beta(beta: float) -> None:
+    """Raise InputError unless beta is a finite number of size below one, as for every pair of materials."""
+    check_number("Dundurs' constant beta", beta, low=-1.0, high=1.0)
+
+
+def _elastic(first: Material | None, second: Material | None) -> list[Material]:
+    bodies = [m for m in (first, second) if m is not None]
+    if not bodies:
+        raise InputError("both bodies are rigid; at least one must be elastic.")
+    return bodies
