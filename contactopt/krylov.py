@@ -27,7 +27,9 @@ from contactopt.semismooth import Equations
 
 FLAT = 1e-8  # eigenvalues of D below this are zero
 RESTART, CYCLES = 60, 3  # of GMRES
-INNER = 1e-3  # accuracy of products and of the model's GMRES, over that of the step
+PRODUCTS = 0.05  # accuracy of products, over that of the step
+INNER = 1e-3  # and of the model's GMRES, which costs next to nothing
+MODEL = 1e-4  # accuracy of the products that make the model
 SLIPPING = 0.5  # diagonal entries of D below this count as zero where only a rough inverse is asked for
 
 Step = tuple[np.ndarray, np.ndarray]  # dr (k, d), dlambda (p,)
@@ -41,7 +43,8 @@ def model_of(problem: InterfaceProblem, name: str | None = None) -> Precondition
     n = problem.q.size
     if name != "none":
         try:
-            return deflated(preconditioner(problem, name or "neumann"), problem.Q, smooth_motions(problem))
+            P, Q = preconditioner(problem, name or "neumann"), loosened(problem.Q, MODEL)
+            return deflated(P, Q, smooth_motions(problem))
         except InputError:
             if name is not None:
                 raise
@@ -63,7 +66,7 @@ def krylov_step(
 def _symmetric_step(
     equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
 ) -> Step:
-    Q, V = loosened(equations.Q, INNER * rtol), equations.V
+    Q, V = loosened(equations.Q, PRODUCTS * rtol), equations.V
     U, delta, rho = _directions(D, equations.rho)
     added = (1 - delta) / (delta * rho) + equations.weight
     known = error.ravel() - U @ (U.T @ error.ravel())
@@ -118,7 +121,7 @@ def _unsymmetric_step(
     closed = np.flatnonzero(np.repeat(np.any(D != 0, axis=(1, 2)), d))
     n = len(closed)
     rho, V = equations.rho[:, None], equations.V
-    Q = loosened(equations.Q, INNER * rtol)
+    Q = loosened(equations.Q, PRODUCTS * rtol)
     known = error.ravel().copy()
     known[closed] = 0.0
 

@@ -13,6 +13,7 @@ from scipy.sparse.linalg import LinearOperator
 
 FORMS = ("auto", "explicit", "implicit")  # of Q
 NOISE = 1e-13  # relative size of what rounding leaves of a zero
+FINEST = 1e-11  # accuracy of products that is not asked for more
 COLUMNS = 64  # unit vectors handed to the bodies at a time when the entries of Q are asked for
 
 Product = Callable[[np.ndarray, float | None], np.ndarray]
@@ -26,6 +27,7 @@ class InterfaceOperator(LinearOperator):
     entries    () -> Q (n, n) where there is a cheaper way to it than n products
     accuracy   relative, of the products; None: the best there is
     held       (n,) mask of the components that cannot move
+    inexact    whether a lower accuracy makes a product cheaper
     products   number of columns multiplied so far
     """
 
@@ -35,9 +37,11 @@ class InterfaceOperator(LinearOperator):
         diagonal: np.ndarray,
         entries: Callable[[], np.ndarray] | None = None,
         accuracy: float | None = None,
+        inexact: bool = False,
     ):
         super().__init__(np.dtype(float), (len(diagonal), len(diagonal)))
-        self.product, self.diagonal, self.entries, self.accuracy = product, diagonal, entries, accuracy
+        self.product, self.diagonal, self.entries = product, diagonal, entries
+        self.accuracy, self.inexact = accuracy, inexact
         self.held = self.diagonal == 0
         self.count = [0]
 
@@ -78,13 +82,13 @@ class InterfaceOperator(LinearOperator):
 
         entries = self.entries
         exact = None if entries is None else lambda: factor * entries() + np.diag(added)
-        scaled = InterfaceOperator(product, factor * self.diagonal + added, exact, self.accuracy)
+        scaled = InterfaceOperator(product, factor * self.diagonal + added, exact, self.accuracy, self.inexact)
         scaled.held = self.held
         return scaled
 
     def loosened(self, accuracy: float) -> InterfaceOperator:
         """The same operator, its products no more accurate than that; both count together."""
-        loose = InterfaceOperator(self.product, self.diagonal, self.entries, accuracy)
+        loose = InterfaceOperator(self.product, self.diagonal, self.entries, accuracy, self.inexact)
         loose.held, loose.count = self.held, self.count
         return loose
 
@@ -99,7 +103,7 @@ class InterfaceOperator(LinearOperator):
 
         entries = self.entries
         exact = None if entries is None else lambda: entries()[np.ix_(unknowns, unknowns)]
-        part = InterfaceOperator(product, self.diagonal[unknowns], exact, self.accuracy)
+        part = InterfaceOperator(product, self.diagonal[unknowns], exact, self.accuracy, self.inexact)
         part.held, part.count = self.held[unknowns], self.count
         return part
 
@@ -142,7 +146,8 @@ def block(Q: Interface, unknowns: np.ndarray) -> Interface:
 
 def loosened(Q: Interface, accuracy: float) -> Interface:
     """Q with products no more accurate than that where it saves work."""
-    return Q.loosened(accuracy) if isinstance(Q, InterfaceOperator) else Q
+    accuracy = max(accuracy, FINEST)
+    return Q.loosened(accuracy) if isinstance(Q, InterfaceOperator) and Q.inexact else Q
 
 
 def nodal_weights(coordinates: np.ndarray, areas: np.ndarray, dim: int) -> np.ndarray:

@@ -156,7 +156,8 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
     G/c - G/c Z (Z'G/c Z)^-1 Z'G/c + QZ A^-1 (QZ)'.
     """
     QZ = np.asarray(Q @ Z)
-    A = np.linalg.inv(Z.T @ QZ)
+    A = Z.T @ QZ
+    A = np.linalg.inv((A + A.T) / 2)
     x = np.random.default_rng(0).normal(size=len(Z))
     x -= Z @ (A @ (QZ.T @ x))
     Qx = np.asarray(Q @ x)

@@ -133,7 +133,7 @@ def reduce_bodies(
     largest = max(len(b.free) for b in bodies if b is not None)
     if Q == "auto":
         iterative = solver == "multigrid" or (solver == "auto" and choose(largest, scene.dim) == "multigrid")
-        Q = form_of(len(gap) * scene.dim, largest, scene.dim, iterative)
+        Q = form_of(max(b.contact_dofs.size for b in bodies if b is not None), largest, scene.dim, iterative)
     first, second = both(lambda b: None if b is None else reduce_body(b, solver, Q == "explicit"), bodies)
     seconds["factorise"] = time.perf_counter() - start
 
@@ -182,18 +182,7 @@ def _maps(
     bodies: Sequence[ReducedBody | None], nodes: Sequence[np.ndarray], frames: np.ndarray
 ) -> tuple[sp.csr_matrix | None, ...]:
     """T (k dim, n) of each body: its displacements -> components in the contact frames; None where rigid."""
-    k, dim = frames.shape[:2]
-    maps = []
-    for body, own in zip(bodies, nodes):
-        if body is None:
-            maps.append(None)
-            continue
-        columns = np.repeat(body.body.basis.nodal_dofs[:, own].T, dim, axis=0).ravel()
-        values, rows = frames.ravel(), np.repeat(np.arange(k * dim), dim)
-        keep = values != 0
-        shape = (k * dim, len(body.at_rest))
-        maps.append(sp.csr_matrix((values[keep], (rows[keep], columns[keep])), shape))
-    return tuple(maps)
+    return tuple(None if body is None else body.contact_map(own, frames) for body, own in zip(bodies, nodes))
 
 
 def _operator(
@@ -216,7 +205,9 @@ def _operator(
 
     moves = np.any([_moves(T, body) for body, T in pairs if body is not None and T is not None], axis=0)
     complete = all(body is None or body.solver.last is not None for body in bodies)
-    return InterfaceOperator(product, estimate_diagonal(product, weights, moves), entries if complete else None)
+    iterative = any(body is not None and body.solver.name == "multigrid" for body in bodies)
+    diagonal = estimate_diagonal(product, weights, moves)
+    return InterfaceOperator(product, diagonal, entries if complete else None, None, iterative)
 
 
 def _moves(T: sp.csr_matrix, body: ReducedBody) -> np.ndarray:

@@ -24,12 +24,13 @@ from contactopt.cones import coulomb_map
 from contactopt.errors import InputError
 from contactopt.krylov import krylov_step, model_of
 from contactopt.methods import NATIVE, Iterate
-from contactopt.operators import InterfaceOperator, diagonal
+from contactopt.operators import InterfaceOperator, diagonal, loosened
 from contactopt.preconditioners import find_preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.semismooth import RIDGE, Equations
 
-FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-6  # accuracy of an iterative step: the first, and the bounds of the others
+FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-4  # accuracy of an iterative step: the first, and the bounds of the others
+SHARP = 1e-2  # accuracy of a residual, over the residual that the step aimed at
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
 LOOSE = 0.5  # share of contacts that do not stick, up to which the bonded factorisation is cheaper than a new one
 
@@ -65,12 +66,15 @@ class Newton:
         equations = coulomb_equations(problem)
         step, first = self._krylov(problem) if implicit else _dense(problem)
         r, multipliers = cold_start(problem, first) if start is None else start
-        last = np.inf
+        last, rtol = np.inf, FIRST
         while True:
+            aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
+            equations.Q = loosened(problem.Q, SHARP * aim)
             residual, error, balance, D = equations.evaluate(r, multipliers)
             # P(y): at the solution equal to r, and within the bounds to the last digit
             yield (r + error, multipliers), residual
-            change = step(equations, error, balance, D, forcing(residual, last))
+            rtol = forcing(residual, last)
+            change = step(equations, error, balance, D, rtol)
             if change is None:
                 return
             r, multipliers, last = r + change[0], multipliers + change[1], residual
