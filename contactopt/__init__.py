@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from contactopt.driver import solve
     from contactopt.enumeration import all_solutions
     from contactopt.errors import BackendError, InputError
+    from contactopt.paths import PathResult, follow
     from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
     from contactopt.recover import Fields
     from contactopt.reduction import reduce, reduce_bodies
@@ -33,6 +34,7 @@ _HOMES = {
     "diagnosis": ("Diagnosis", "diagnose"),
     "enumeration": ("all_solutions",),
     "errors": ("BackendError", "InputError"),
+    "paths": ("PathResult", "follow"),
     "problem": ("InterfaceProblem", "Solution", "Status", "natural_map_residual"),
     "recover": ("Fields",),
     "reduction": ("reduce", "reduce_bodies"),
@@ -40,7 +42,7 @@ _HOMES = {
     "warm": ("transfer",),
     "scene": ("BodyForce", "Material", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
 }
-_MODULES = ("fclib", "models", "plots", "scenes")
+_MODULES = ("analytic", "animation", "benchmark", "fclib", "models", "plots", "scenes")
 __all__ = sorted([*(name for names in _HOMES.values() for name in names), *_MODULES])
 
 

@@ -1,12 +1,13 @@
 """One elastic body as matrices: stiffness, loads, held and driven degrees of freedom, contact nodes.
 
-Linear finite elements of scikit-fem on the mesh that a Part gives. Every integral carries the weight of the scene's
-kind (thickness, 2 pi r, mirror images), so that forces and areas are those of the whole body.
+Finite elements of scikit-fem on the mesh that a Part gives, of the scene's degree. Every integral carries the weight of
+the scene's kind (thickness, 2 pi r, mirror images), so that forces and areas are those of the whole body.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,16 +15,9 @@ import skfem
 from scipy.sparse.csgraph import connected_components
 from skfem.helpers import dot
 
+from contactopt.elements import SHAPES, contact_trace, make_basis, node_unknowns, straight, weight_at
 from contactopt.errors import InputError
 from contactopt.scene import Material, Part, Plate, Scene, Traction
-
-ELEMENTS = {
-    "RefLine": skfem.ElementLineP1,
-    "RefTri": skfem.ElementTriP1,
-    "RefQuad": skfem.ElementQuad1,
-    "RefTet": skfem.ElementTetP1,
-    "RefHex": skfem.ElementHex1,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +29,10 @@ class Body:
     lift    (n,) prescribed displacements of the supports, 0 elsewhere
     motion  (n, p) unit motions of the p plate components that may move; zero on free unknowns
     thrust  (p,) total forces on them
-    nodes   (k,) mesh nodes of the candidate contact boundary
-    areas   (k,) nodal areas, the integrals of the shape functions over it
+    nodes   (k,) vertices of the candidate contact boundary
+    areas   (k,) nodal areas, the integrals of the hat functions over it
     normals (dim, k) outward unit normals there, averaged over the facets
+    weights (k, nodes) what the displacement of the nodes contributes to that of the contacts (contactopt.elements)
     """
 
     name: str
@@ -53,6 +48,22 @@ class Body:
     nodes: np.ndarray
     areas: np.ndarray
     normals: np.ndarray
+    weights: sp.csr_matrix
+
+    @property
+    def degree(self) -> int:
+        """Of the displacement in every element, 1 or 2."""
+        return 1 if self.unknowns.shape[1] == self.basis.mesh.nvertices else 2
+
+    @cached_property
+    def unknowns(self) -> np.ndarray:
+        """Displacement unknowns of every node, (dim, n / dim); the vertices of the mesh come first."""
+        return node_unknowns(self.basis)
+
+    @property
+    def locations(self) -> np.ndarray:
+        """Coordinates of every node, (dim, n / dim)."""
+        return np.asarray(self.basis.doflocs[:, self.unknowns[0]])
 
     @property
     def points(self) -> np.ndarray:
@@ -61,14 +72,8 @@ class Body:
 
     @property
     def contact_dofs(self) -> np.ndarray:
-        """Displacement unknowns of the contact nodes, (k, dim)."""
-        return np.asarray(self.basis.nodal_dofs[:, self.nodes].T)
-
-
-def weight_at(weight: tuple[float, bool], x: np.ndarray) -> np.ndarray | float:
-    """Measure of the integrals: a constant (thickness, copies), times r in an axisymmetric scene."""
-    factor, axisymmetric = weight
-    return factor * x[0] if axisymmetric else factor
+        """Displacement unknowns of the nodes on the contact boundary, (m, dim); at degree 1 those of the k contacts."""
+        return np.asarray(self.unknowns[:, np.unique(self.weights.indices)].T)
 
 
 def lame(material: Material) -> tuple[float, float]:
@@ -84,8 +89,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> B
     axisymmetric = scene.kind == "axisymmetric"
     factor = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}[scene.kind] * scene.copies
     weight = (factor, axisymmetric)
-    scalar = ELEMENTS[mesh.refdom.__name__]()
-    basis = skfem.Basis(mesh, skfem.ElementVector(scalar), intorder=3 if axisymmetric else 2)
+    basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, axisymmetric)
     A = stiffness(basis, part.material, weight)
     pieces = connected_components(A, directed=False)[0]
     if pieces > 1:
@@ -95,7 +99,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> B
         )
     lift, held, motion, thrust = _constraints(scene, part, basis)
     _check_rigid_modes(scene, part, basis, held)
-    nodes, areas, normals = _contact(part, mesh, scalar, weight)
+    contact = contact_trace(basis, scene.degree, mesh.boundaries[part.contact], weight)
     return Body(
         part.name,
         part.material,
@@ -107,9 +111,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> B
         np.flatnonzero(~held),
         motion,
         thrust,
-        nodes,
-        areas,
-        normals,
+        *contact,
     )
 
 
@@ -159,7 +161,7 @@ def _pairs(f: np.ndarray, measure: np.ndarray) -> np.ndarray:
 
 
 def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
-    if not isinstance(mesh, skfem.Mesh) or mesh.p.shape[0] != scene.dim or mesh.refdom.__name__ not in ELEMENTS:
+    if not isinstance(mesh, skfem.Mesh) or mesh.p.shape[0] != scene.dim or mesh.refdom.__name__ not in SHAPES:
         raise InputError(
             f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension {scene.dim} made of "
             f"triangles, quadrilaterals, tetrahedra or hexahedra; got {type(mesh).__name__}."
@@ -200,10 +202,11 @@ def _load(part: Part, basis: skfem.CellBasis, weight: tuple[float, bool]) -> np.
 def _constraints(scene: Scene, part: Part, basis: skfem.CellBasis) -> tuple[np.ndarray, ...]:
     """Prescribed displacements, the mask of unknowns that are not free, plate motions and plate forces."""
     lift, held = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
+    table = node_unknowns(basis)
 
     def unknowns(boundary: str, component: str) -> np.ndarray:
-        nodes = np.unique(basis.mesh.facets[:, basis.mesh.boundaries[boundary]])
-        return np.asarray(basis.nodal_dofs[scene.components.index(component), nodes])
+        there = basis.get_dofs(facets=np.asarray(basis.mesh.boundaries[boundary])).flatten()
+        return np.intersect1d(there, table[scene.components.index(component)])
 
     for support in part.supports:
         values = dict.fromkeys(scene.components, 0.0) if support.displacement is None else support.displacement
@@ -245,7 +248,9 @@ def _constraints(scene: Scene, part: Part, basis: skfem.CellBasis) -> tuple[np.n
 
 def _check_rigid_modes(scene: Scene, part: Part, basis: skfem.CellBasis, held: np.ndarray) -> None:
     """The motions of the body as a rigid whole must not all leave the held unknowns at rest."""
-    x = basis.mesh.p - basis.mesh.p.mean(axis=1, keepdims=True)
+    table = node_unknowns(basis)
+    x = basis.doflocs[:, table[0]]
+    x = x - x.mean(axis=1, keepdims=True)
     x = x / np.abs(x).max()
     names, modes = [], []
     for i, component in enumerate(scene.components):
@@ -261,7 +266,7 @@ def _check_rigid_modes(scene: Scene, part: Part, basis: skfem.CellBasis, held: n
                 names.append(f"rotation in the {scene.components[j]}-{scene.components[i]} plane")
     R = np.zeros((basis.N, len(modes)))
     for column, mode in zip(R.T, modes):
-        column[basis.nodal_dofs] = mode
+        column[table] = mode
     values, vectors = np.linalg.eigh(R[held].T @ R[held])  # its kernel: the motions that nothing holds
     if values[0] < 1e-12 * held.sum() or not held.any():
         motion = names[int(np.argmax(np.abs(vectors[:, 0])))]
@@ -269,16 +274,3 @@ def _check_rigid_modes(scene: Scene, part: Part, basis: skfem.CellBasis, held: n
             f"body '{part.name}' is free to move ({motion}), so its stiffness is singular; "
             "add a Support, or load it through a rigid Plate."
         )
-
-
-def _contact(part: Part, mesh: skfem.Mesh, scalar: skfem.Element, weight: tuple[float, bool]) -> tuple[np.ndarray, ...]:
-    facets = skfem.FacetBasis(mesh, scalar, facets=mesh.boundaries[part.contact], intorder=3)
-
-    def integrate(value) -> np.ndarray:  # type: ignore[no-untyped-def]
-        return skfem.LinearForm(lambda v, w: value(w) * v).assemble(facets)
-
-    nodes = np.unique(mesh.facets[:, mesh.boundaries[part.contact]])
-    areas = integrate(lambda w: weight_at(weight, w.x))[nodes]
-    normals = np.stack([integrate(lambda w, i=i: w.n[i])[nodes] for i in range(mesh.p.shape[0])])
-    normals /= np.linalg.norm(normals, axis=0)
-    return nodes, areas, np.where(np.abs(normals) < 1e-14, 0.0, normals)  # exact axes stay exact

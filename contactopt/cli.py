@@ -5,11 +5,15 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from contactopt.backends import CONIC, QP
 from contactopt.errors import InputError
+from contactopt.linear import SOLVERS
 from contactopt.methods import METHODS, NATIVE
-from contactopt.scenes import SCENES
+from contactopt.operators import FORMS
+from contactopt.preconditioners import PRECONDITIONERS
+from contactopt.scenes import PATHS, SCENES
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -32,10 +36,36 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--method", help=", ".join(METHODS) + " (auto, or alternating if a backend is named)")
     run.add_argument("--normal", metavar="BACKEND", help="QP backend of the normal problem")
     run.add_argument("--tangential", metavar="BACKEND", help="QP (2D, axisymmetric) or conic (3D) backend")
+    run.add_argument(
+        "--q", metavar="FORM", default="auto", help=", ".join(FORMS) + ": Q as an array or by its products"
+    )
+    run.add_argument(
+        "--preconditioner", metavar="NAME", help=", ".join(PRECONDITIONERS) + ", none; selects --q implicit"
+    )
+    run.add_argument("--solver", metavar="NAME", default="auto", help="of the bodies: auto, " + ", ".join(SOLVERS))
     run.add_argument("--mu", type=float, metavar="X", help="friction coefficient")
     run.add_argument("--force", type=float, metavar="N", help="total normal force")
     run.add_argument("--elements", type=int, metavar="N", help="elements across the contact half-width")
     run.add_argument("--tol", type=float, default=1e-8, metavar="T", help="bound on the natural-map residual (1e-8)")
+    bench = commands.add_parser("bench", help="execute the runs of an experiment file")
+    bench.set_defaults(command=_bench)
+    bench.add_argument("file", metavar="FILE", help="experiment, TOML (see contactopt.benchmark)")
+    bench.add_argument("--out", metavar="DIR", help="where results go (default: out/bench/NAME)")
+    bench.add_argument("--jobs", type=int, metavar="N", help="worker processes (one per core)")
+    bench.add_argument("--resume", action="store_true", help="go on with an interrupted campaign")
+    bench.add_argument(
+        "--filter", action="append", default=[], metavar="COL=PATTERN", help="problem, method, setting, ..."
+    )
+    bench.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, instead of local processes")
+    report = commands.add_parser("report", help="rebuild the benchmark reports from their tables, without solving")
+    report.set_defaults(command=_report)
+    report.add_argument("names", nargs="*", metavar="NAME", help="of the experiments to run (all)")
+    report.add_argument("--experiments", default="experiments/campaigns", metavar="DIR", help="(experiments/campaigns)")
+    report.add_argument("--reports", default="reports", metavar="DIR", help="where tables and reports are (reports)")
+    report.add_argument(
+        "--run", default="", choices=("quick", "full"), help="run the experiments first; quick: in out/"
+    )
+    report.add_argument("--jobs", type=int, metavar="N", help="worker processes (one per core)")
     show = commands.add_parser("list", help="scenes, methods, preconditioners and backends")
     show.set_defaults(command=_list)
     return parser
@@ -52,6 +82,9 @@ def _run(options: argparse.Namespace) -> int:
         method=options.method,
         normal=options.normal,
         tangential=options.tangential,
+        preconditioner=options.preconditioner,
+        Q=options.q,
+        solver=options.solver,
         tol=options.tol,
         elements=options.elements,
         note=lambda text: print(f"  {text}", file=sys.stderr, flush=True),
@@ -60,6 +93,8 @@ def _run(options: argparse.Namespace) -> int:
     s = result.summary
     print(f"{s['scene']}: {s['dofs']} unknowns, {s['contact_nodes']} contact nodes, mu = {s['mu']:g}")
     print(f"{s['status']}: {result.solution.message}; {s['outer_iterations']} iterations, residual {s['residual']:.1e}")
+    if s["q"] == "implicit":
+        print(f"Q by {s['products']} products, never formed")
     native = s["normal_backend"] == s["tangential_backend"] == NATIVE
     by = f", normal problem by {s['normal_backend']}, tangential by {s['tangential_backend']}"
     print(f"method {s['method']}" + ("" if native else by))
@@ -69,19 +104,51 @@ def _run(options: argparse.Namespace) -> int:
     print(
         f"{s['seconds']['total']:.1f} s: " + ", ".join(f"{k} {v:.2f}" for k, v in s["seconds"].items() if k != "total")
     )
-    print(f"files in {out}: summary.json, deformed.png, pressure.png, interface.npz, *.vtu")
+    extra = "" if result.path is None else " path.png, history.csv, path.npz,"
+    print(f"files in {out}: summary.json, deformed.png, pressure.png,{extra} interface.npz, *.vtu")
     return 0 if result.solution.solved else 1
 
 
-def _list(options: argparse.Namespace) -> int:
-    from contactopt.preconditioners import PRECONDITIONERS
+def _bench(options: argparse.Namespace) -> int:
+    from contactopt.benchmark.campaign import run_campaign
+    from contactopt.benchmark.store import load
 
+    try:
+        folder = run_campaign(
+            options.file,
+            options.out,
+            jobs=options.jobs,
+            resume=options.resume,
+            filters=options.filter,
+            scheduler=options.scheduler,
+        )
+    except KeyboardInterrupt:
+        print("contactopt: interrupted; finished runs are kept, go on with --resume", file=sys.stderr)
+        return 130
+    table = load(folder)
+    print(f"{len(table)} runs: " + ", ".join(f"{n} {status}" for status, n in table["status"].value_counts().items()))
+    print(f"results in {folder}: rows.parquet (read them with contactopt.benchmark.load)")
+    return 0
+
+
+def _report(options: argparse.Namespace) -> int:
+    from contactopt.benchmark.campaign import run_reports
+
+    paths = sorted(Path(options.experiments).glob("*.toml"))
+    page = run_reports(paths, options.reports, options.run, options.names, options.jobs)
+    print(f"reports in {page.parent}, all of them in {page}")
+    return 0
+
+
+def _list(options: argparse.Namespace) -> int:
     print("scenes")
     for name, (_, what) in SCENES.items():
-        print(f"  {name:12} {what}")
+        print(f"  {name:26} {what}" + (" (load path)" if name in PATHS else ""))
     print("methods")
     for name, (_, _, what) in METHODS.items():
         print(f"  {name:20} {what}")
+    print("forms of the interface operator Q: " + ", ".join(FORMS))
+    print("solvers of the bodies: auto, " + ", ".join(SOLVERS))
     print("preconditioners of the interface operator")
     for name, (_, what) in PRECONDITIONERS.items():
         print(f"  {name:20} {what}")

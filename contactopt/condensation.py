@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.body import Body
 from contactopt.linear import BodySolver, make_solver
@@ -74,20 +75,48 @@ class ReducedBody:
         """Displacement of all unknowns under nodal contact forces (n,) and plate displacements (p,), eq (13)."""
         return np.asarray(self.at_rest + self.elastic(force) + self.motions @ multipliers)
 
+    def contact_map(self, nodes: np.ndarray, frames: np.ndarray) -> sp.csr_matrix:
+        """T (k dim, n): displacements -> their components in the frames (k, dim, dim) at the contact nodes (k,).
+
+        A component that is held at a contact node is taken there alone, without its neighbours: on a plane of symmetry
+        those of the mirror image cancel them.
+        """
+        body, (k, dim) = self.body, frames.shape[:2]
+        held = np.ones(len(self.at_rest), dtype=bool)
+        held[body.free] = False
+        weights = body.weights[np.searchsorted(body.nodes, nodes)]
+        alone = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), weights.shape)
+        maps = []
+        for c, unknowns in enumerate(body.unknowns):
+            at_rest = sp.diags(held[unknowns[nodes]].astype(float))
+            turn = sp.csr_matrix((frames[:, :, c].ravel(), (np.arange(k * dim), np.repeat(np.arange(k), dim))))
+            part = sp.coo_matrix(turn @ (weights - at_rest @ (weights - alone)))
+            maps.append(sp.csr_matrix((part.data, (part.row, unknowns[part.col])), (k * dim, len(held))))
+        T = sp.csr_matrix(sum(maps[1:], maps[0]))
+        T.eliminate_zeros()
+        return T
+
+    def contact_force(self, nodes: np.ndarray, frames: np.ndarray, reactions: np.ndarray) -> np.ndarray:
+        """Forces (n,) on the free unknowns by reactions (k, dim) on this body at its contact nodes, in their frames."""
+        force = self.contact_map(nodes, frames).T @ reactions.ravel()
+        out = np.zeros(len(force))
+        out[self.body.free] = force[self.body.free]
+        return out
+
 
 def reduce_body(body: Body, solver: str = "auto", schur: bool = True) -> ReducedBody:
     """Make one body's linear system solvable and condense its plates.
 
     schur  eliminate the contact unknowns last, so that the factors hold their Schur complement: for an explicit Q
     """
-    dofs, n = np.asarray(body.basis.nodal_dofs), len(body.load)
+    dofs, n = body.unknowns, len(body.load)
     node, component, place = np.empty(n, int), np.empty(n, int), np.full(n, -1)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
     place[body.free] = np.arange(len(body.free))
     interface = np.intersect1d(body.contact_dofs, body.free)
     A = body.A[body.free][:, body.free]
     last = place[interface] if schur else None
-    made = make_solver(solver, A, node[body.free], component[body.free], body.basis.mesh.p, last)
+    made = make_solver(solver, A, node[body.free], component[body.free], body.locations, last)
     extended = body.motion.copy()
     extended[body.free] -= made.solve((body.A @ body.motion)[body.free])
     K = extended.T @ (body.A @ extended)

@@ -20,7 +20,8 @@ def match_bodies(scene: Scene, upper: Body | None, lower: Body | None) -> tuple[
         own, other = _match(upper, lower)
         nodes = (upper.nodes[own], lower.nodes[other])
         normals = lower.normals[:, other]
-        gap = np.sum(normals * (upper.points[:, own] - lower.points[:, other]), axis=0)
+        apart = (upper.weights @ upper.locations.T)[own] - (lower.weights @ lower.locations.T)[other]
+        gap = np.sum(normals * apart.T, axis=0)
         areas = lower.areas[other]
     else:
         body, rigid, sign = (upper, scene.lower, -1.0) if upper is not None else (lower, scene.upper, 1.0)
@@ -31,10 +32,19 @@ def match_bodies(scene: Scene, upper: Body | None, lower: Body | None) -> tuple[
         if rigid.normal is not None:
             normals = np.tile(np.array(rigid.normal)[:, None] / np.linalg.norm(rigid.normal), len(own))
         areas = body.areas[own]
-        gap = np.zeros(len(own)) if rigid.gap is None else np.asarray(rigid.gap(body.points[:, own]), dtype=float)
-        if gap.shape != (len(own),) or not np.all(np.isfinite(gap)):
-            raise InputError(f"the gap of rigid body '{rigid.name}' must give one finite number per contact node.")
+        gap = _rigid_gap(body, rigid)[own]
     return nodes, _frames(normals), gap, areas
+
+
+def _rigid_gap(body: Body, rigid: Rigid) -> np.ndarray:
+    """Initial gap (k,) between a body and a rigid one: of the nodes on its contact boundary, as their displacement."""
+    if rigid.gap is None:
+        return np.zeros(len(body.nodes))
+    surface = np.unique(body.weights.indices)
+    gap = np.asarray(rigid.gap(body.locations[:, surface]), dtype=float)
+    if gap.shape != surface.shape or not np.all(np.isfinite(gap)):
+        raise InputError(f"the gap of rigid body '{rigid.name}' must give one finite number per contact node.")
+    return np.asarray(body.weights[:, surface] @ gap)
 
 
 def _match(upper: Body, lower: Body) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The linear system A x = b of one elastic body behind one seam: sparse Cholesky-like factors or multigrid.
+"""The linear system A x = b of one elastic body behind one seam: sparse factors or multigrid.
 
 A is the stiffness on the free displacement unknowns, symmetric positive definite. Every solver is made by a function
 of SOLVERS from
@@ -14,6 +14,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable
 from functools import cached_property
+from importlib.util import find_spec
 from typing import Any, Protocol
 
 import numpy as np
@@ -22,12 +23,13 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from contactopt.dissection import nested_dissection
-from contactopt.errors import BackendError, InputError
-from contactopt.multigrid import VCycle
+from contactopt.errors import InputError
+from contactopt.multigrid import VCycle, conjugate_gradients
 from contactopt.scene import check_number
 
 RTOL = 1e-10  # default accuracy of an iterative solve
-MOST = 300  # conjugate gradient iterations
+SMALL = 20_000  # unknowns of a 3D body for which PARDISO is not worth its start
+LARGEST = {"superlu": 100_000, "pardiso": 200_000}  # unknowns of a 3D body that is factorised
 
 
 class BodySolver(Protocol):
@@ -65,15 +67,23 @@ def make_solver(
     Raises InputError for an unknown name or a missing package.
     """
     if name == "auto":
-        name = choose(A.shape[0], len(points))
+        name = choose(A.shape[0], len(points), find_spec("pypardiso") is not None)
     if name not in SOLVERS:
         raise InputError(f"unknown body solver {name!r}; choose from auto, {', '.join(SOLVERS)}.")
     return SOLVERS[name](A, node, component, points, last)
 
 
-def choose(n: int, dim: int) -> str:
-    """The solver for n unknowns in `dim` dimensions."""
-    return "superlu" if dim == 2 or n <= 100_000 else "multigrid"
+def choose(n: int, dim: int, pardiso: bool = False) -> str:
+    """The cheapest solver for n unknowns in `dim` dimensions; `pardiso` only where it is installed.
+
+    Factors in an order of nested dissection have about n log n entries in 2D, 45 n^(4/3) in 3D, and take n^(3/2) and n^2
+    operations; the work of multigrid and its memory grow with n. At LARGEST in 3D the factors take 2 GB, and those of
+    SuperLU as long to make as some 20 solves by multigrid (reports/body_solvers). PARDISO takes a second to start.
+    """
+    if dim == 2 or n <= SMALL:
+        return "superlu"
+    factors = "pardiso" if pardiso else "superlu"
+    return factors if n <= LARGEST[factors] else "multigrid"
 
 
 class SuperLUSolver:
@@ -119,19 +129,13 @@ class SuperLUSolver:
     def trailing_inverse(self) -> np.ndarray:
         if self.trailing_triangle is None:
             return _inverse_block(self, len(self.order))
-        R, place = self.trailing_triangle
-        X = la.solve_triangular(R, np.eye(len(R)), lower=True, check_finite=False)
-        C = X.T @ X  # NumPy keeps it symmetric
-        return np.asarray(C[np.ix_(place, place)])
+        return _triangle_inverse(*self.trailing_triangle)
 
     def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         """Two triangular solves with the trailing triangle: nothing of the interior is touched."""
         if self.trailing_triangle is None:
             return _block_product(self, len(self.order), load, rtol)
-        R, place = self.trailing_triangle
-        x = np.empty(load.shape)
-        x[place] = load
-        return np.asarray(la.cho_solve((R, True), x, check_finite=False))[place]
+        return _triangle_product(*self.trailing_triangle, load)
 
 
 def elimination_order(
@@ -182,11 +186,28 @@ class PardisoSolver:
             return np.zeros(load.shape)
         return np.asarray(self.factors.solve(self.upper, np.asfortranarray(load, dtype=float)))
 
+    @cached_property
+    def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray]:
+        """As SuperLUSolver's; from a factorisation that ends at the Schur complement."""
+        from pypardiso import PyPardisoSolver
+
+        last, n = _asked(self.last), self.upper.shape[0]
+        if not len(last):
+            return np.zeros((0, 0)), np.zeros(0, int)
+        partial = PyPardisoSolver(mtype=2, phase=12)
+        for index, value in {1: 1, 2: 2, 10: 13, 21: 1, 36: 1}.items():  # own values; METIS; defaults; Schur complement
+            partial.set_iparm(index, value)
+        partial.perm = np.zeros(n, dtype=np.int32)
+        partial.perm[last] = 1
+        S = partial._call_pardiso(self.upper, np.zeros((len(last), len(last))))  # in the order of sorted unknowns
+        partial.free_memory(everything=True)
+        return np.linalg.cholesky(S), np.argsort(np.argsort(last))
+
     def trailing_inverse(self) -> np.ndarray:
-        return _inverse_block(self, self.upper.shape[0])
+        return _triangle_inverse(*self.trailing_triangle)
 
     def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        return _block_product(self, self.upper.shape[0], load, rtol)
+        return _triangle_product(*self.trailing_triangle, load)
 
 
 class MultigridSolver:
@@ -217,25 +238,10 @@ class MultigridSolver:
         out = np.zeros(columns.shape)
         self.iterations = 0
         for b, x in zip(columns.T, out.T):
-            x[:] = self.cycle.scale * self._conjugate_gradients(self.cycle.scale * b, rtol)
+            answer, steps = conjugate_gradients(self.cycle, self.cycle.scale * b, rtol)
+            x[:] = self.cycle.scale * answer
+            self.iterations = max(self.iterations, steps)
         return out.reshape(load.shape)
-
-    def _conjugate_gradients(self, r: np.ndarray, rtol: float) -> np.ndarray:
-        """Solution of the scaled system for the right-hand side r."""
-        x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
-        for step in range(MOST + 1):
-            z = self.cycle.apply(r)
-            size, previous = float(r @ z), size
-            goal = rtol**2 * size if goal is None else goal
-            if size <= goal:
-                self.iterations = max(self.iterations, step)
-                return x
-            p = z + (size / previous) * p
-            Ap = self.cycle.A @ p
-            alpha = size / float(p @ Ap)
-            x += alpha * p
-            r = r - alpha * Ap
-        raise BackendError(f"multigrid: the error was not reduced by {rtol:g} within {MOST} iterations.")
 
     def trailing_inverse(self) -> np.ndarray:
         return _inverse_block(self, len(self.cycle.scale))
@@ -248,6 +254,18 @@ def _asked(last: np.ndarray | None) -> np.ndarray:
     if last is None:
         raise InputError("no unknowns were named whose block of the inverse is asked for; give `last`.")
     return last
+
+
+def _triangle_inverse(R: np.ndarray, place: np.ndarray) -> np.ndarray:
+    X = la.solve_triangular(R, np.eye(len(R)), lower=True, check_finite=False)
+    C = X.T @ X  # NumPy keeps it symmetric
+    return np.asarray(C[np.ix_(place, place)])
+
+
+def _triangle_product(R: np.ndarray, place: np.ndarray, load: np.ndarray) -> np.ndarray:
+    x = np.empty(load.shape)
+    x[place] = load
+    return np.asarray(la.cho_solve((R, True), x, check_finite=False))[place]
 
 
 def _inverse_block(solver: Any, n: int, columns: int = 64) -> np.ndarray:

@@ -18,8 +18,9 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import eigsh
 
-from contactopt.errors import InputError
+from contactopt.errors import BackendError, InputError
 
+MOST = 300  # conjugate gradient iterations
 COARSEST = 60  # nodes or aggregates that are not coarsened further
 NEAR = 1.5  # neighbours at up to this multiple of the least distance are aggregated
 DEGREE = 3  # of the smoothing polynomial
@@ -56,7 +57,7 @@ class VCycle:
         self.scale = scale = _inverse_root(A.diagonal())
         self.A = _scaled(A, scale)
         self.levels: list[Level] = []
-        blocks, place, present = _blocks(A, node, component, len(points))
+        blocks, place, present = nodal_blocks(A, node, component, len(points))
         points, modes = points[:, present], rigid_motions(points[:, present])
         modes[np.setdiff1d(np.arange(len(modes)), place)] = 0.0
         level = self.A
@@ -86,6 +87,28 @@ class VCycle:
         return sum(level.A.nnz for level in self.levels) / self.A.nnz if self.levels else 1.0
 
 
+def conjugate_gradients(cycle: VCycle, r: np.ndarray, rtol: float) -> tuple[np.ndarray, int]:
+    """Solution of the scaled system for the right-hand side r (n,), and the number of iterations.
+
+    Ends where (r' B r)^1/2, r the residual, has fallen by rtol; BackendError if it does not within MOST iterations.
+    """
+    x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
+    for step in range(MOST + 1):
+        z = cycle.apply(r)
+        size, previous = float(r @ z), size
+        goal = rtol**2 * size if goal is None else goal
+        if size <= goal:
+            return x, step
+        if not np.isfinite(size):
+            break
+        p = z + (size / previous) * p
+        Ap = cycle.A @ p
+        alpha = size / float(p @ Ap)
+        x += alpha * p
+        r = r - alpha * Ap
+    raise BackendError(f"multigrid: the error was not reduced by {rtol:g} within {MOST} iterations.")
+
+
 def coarsen(A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
     """Prolongation from the aggregates of nodes, and the modes and points of the aggregates.
 
@@ -96,7 +119,9 @@ def coarsen(A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray) -> tuple[sp
         from pyamg.aggregation.smooth import jacobi_prolongation_smoother
         from pyamg.aggregation.tentative import fit_candidates
     except ImportError as error:
-        raise InputError("the body solver 'multigrid' needs the package pyamg: pip install pyamg.") from error
+        raise InputError(
+            "the body solver 'multigrid' needs the package pyamg: pip install pyamg, or choose another."
+        ) from error
     near = near_neighbours(A, points)
     groups = standard_aggregation(near)[0]
     tentative, modes = fit_candidates(groups, modes)
@@ -141,7 +166,7 @@ def largest_eigenvalue(A: sp.csr_matrix) -> float:
     return 1.02 * float(eigsh(A, 1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0])
 
 
-def _blocks(
+def nodal_blocks(
     A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
     """A in blocks of nodes, the place of each unknown there, the nodes present; held unknowns are rows of their own."""

@@ -28,7 +28,7 @@ def magnification(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fiel
     displacement = max(float(np.abs(f.displacement).max()) for f in fields)
     if displacement == 0 or np.ptp(problem.q[:, 0]) > 1e-3 * displacement:
         return 1.0
-    size = max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
+    size = _reach(scene, fields) or max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
     target = 0.08 * size / displacement
     power = 10.0 ** np.floor(np.log10(target))
     return float(max(1.0, power * max(m for m in (1, 2, 5) if m * power <= target)))
@@ -60,11 +60,23 @@ def _draw_section(scene: Scene, fields: Sequence[Fields], scale: float, top: flo
             ax.plot(mirror * points[0][outline], points[1][outline], color="black", lw=0.6)
     across, up = scene.components
     ax.set(xlabel=f"{across} [{scene.units[0]}]", ylabel=f"{up} [{scene.units[0]}]", aspect="equal")
-    if scene.zone is not None:  # a small contact on large bodies: show where it happens
-        reach = 4 * (scene.reference.half_width if scene.reference else scene.zone)
+    reach = _reach(scene, fields)
+    if reach is not None:
         ax.set(xlim=(-reach, reach), ylim=(-0.9 * reach, 0.6 * reach))
     ax.figure.colorbar(colours, ax=ax, label=f"von Mises stress [{scene.units[1]}]", extend="max", shrink=0.8)
     return ax
+
+
+def _reach(scene: Scene, fields: Sequence[Fields]) -> float | None:
+    """How far from the centre to look at a small contact on large bodies; None: show the whole bodies."""
+    half_width = scene.reference.half_width if scene.reference else scene.zone
+    large = half_width is not None and max(np.ptp(f.mesh.p[0]) for f in fields) > 16 * half_width
+    return 4 * half_width if half_width is not None and large and scene.dim == 2 else None
+
+
+def _singular(scene: Scene) -> bool:
+    """Whether tractions are known to be infinite somewhere, so that the largest nodal value means nothing."""
+    return scene.reference is not None and scene.reference.peak is None
 
 
 def _half_model(scene: Scene, fields: Sequence[Fields]) -> bool:
@@ -113,7 +125,7 @@ def _in_cycle(facets: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.asarray(np.take_along_axis(facets, np.argsort(angle, axis=1), axis=1))
 
 
-def _line(problem: InterfaceProblem) -> np.ndarray:
+def contact_line(problem: InterfaceProblem) -> np.ndarray:
     """Contact nodes along the first axis, sorted; in 3D those of the row nearest y = 0."""
     x = problem.coordinates
     row = np.ones(x.shape[1], dtype=bool)
@@ -127,7 +139,7 @@ def _line(problem: InterfaceProblem) -> np.ndarray:
 def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
     """Contact pressure over its mean against position over half-width (paper, figure 3), with the exact curve."""
     ax = _axes(ax)
-    line = _line(problem)
+    line = contact_line(problem)
     x = problem.coordinates[0, line]
     p = solution.reactions[line, 0] / problem.areas[line]
     a = contact_half_width(scene, problem, solution.reactions)
@@ -144,7 +156,7 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     ax.set(
         xlabel=f"{across} / a [-]{where}, a = {a:.4g} {scene.units[0]}",
         ylabel=f"p / mean p [-], mean p = {mean:.4g} {scene.units[1]}",
-        ylim=(0, 1.15 * float((p / mean).max() or 1.0)),
+        ylim=(0, 5.0 if _singular(scene) else 1.15 * float((p / mean).max() or 1.0)),
     )
     ax.legend(frameon=False)
     return ax
@@ -153,7 +165,7 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
 def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
     """Tangential traction against position with the friction bound; sticking and slipping nodes marked."""
     ax = _axes(ax)
-    line = _line(problem)
+    line = contact_line(problem)
     x = problem.coordinates[0, line]
     t = solution.reactions[line, 1] / problem.areas[line]
     bound = problem.mu[line] * np.abs(solution.reactions[line, 0]) / problem.areas[line]
@@ -162,6 +174,15 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     ax.plot(x, bound, color=GREY, lw=1, ls="--", label="friction bound, +/- mu p")
     ax.plot(x, -bound, color=GREY, lw=1, ls="--")
     ax.plot(x, t, color=BLUE, lw=1)
+    if scene.reference is not None and scene.reference.shear is not None:
+        fine = np.linspace(x.min(), x.max(), 801)
+        with np.errstate(all="ignore"):
+            exact = -scene.reference.shear(fine)
+        exact[np.abs(exact) > 1.1 * bound.max(initial=0.0)] = np.nan  # singular at the edge of a punch
+        ax.plot(fine, exact, color="black", lw=1, label=f"exact: {scene.reference.label}", zorder=3)
+    if _singular(scene) and np.any(bound):
+        mean = float(np.average(bound, weights=problem.areas[line]))
+        ax.set_ylim(-5 * mean, 5 * mean)
     ax.plot(x[sticking], t[sticking], "o", color=BLUE, ms=5, label="stick")
     slipping = touching & ~sticking
     ax.plot(x[slipping], t[slipping], "s", color=ORANGE, ms=5, mfc="white", label="slip")

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import skfem
 
 from contactopt.body import Body, lame
+from contactopt.elements import SHAPES, straight
 from contactopt.problem import Solution
 from contactopt.reduction import ReducedBody, Reduction
 
@@ -22,7 +24,7 @@ PLACES = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """One body after the solve, at its n mesh nodes.
+    """One body after the solve, at the n vertices of its mesh.
 
     displacement (dim, n) [length];  stress (n, 4 or 6) [stress], components named in `names`;  von_mises (n,)
     """
@@ -62,10 +64,7 @@ def body_fields(
 ) -> Fields:
     """Fields of one body under contact forces (k, dim) on it, in the local frames, and plate displacements (p,)."""
     basis = body.body.basis
-    force = np.zeros(basis.N)
-    force[basis.nodal_dofs[:, nodes].T] = np.einsum("ka,kac->kc", reactions, reduction.frames)
-    force[~np.isin(np.arange(basis.N), body.body.free)] = 0.0
-    U = body.displacement(force, multipliers)
+    U = body.displacement(body.contact_force(nodes, reduction.frames, reactions), multipliers)
     stress = nodal_stress(body.body, U)
     dim = basis.mesh.p.shape[0]
     full = np.stack([stress[i, j] for i, j in PLACES[dim]], axis=1)
@@ -73,30 +72,43 @@ def body_fields(
     deviator = stress - mean * np.eye(3)[:, :, None]
     von_mises = np.sqrt(1.5 * np.sum(deviator**2, axis=(0, 1)))
     names = STRESSES[reduction.scene.kind]
-    return Fields(body.body.name, basis.mesh, names, U[basis.nodal_dofs], full, von_mises)
+    return Fields(body.body.name, straight(basis.mesh), names, U[basis.nodal_dofs], full, von_mises)
 
 
 def nodal_stress(body: Body, U: np.ndarray) -> np.ndarray:
-    """Stress tensor (3, 3, n) at the mesh nodes: element means, averaged with the elements' volumes.
+    """Stress tensor (3, 3, n) at the vertices of the mesh, averaged over the elements with their volumes.
 
-    Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
+    An element counts with its mean stress where the displacement is linear, with its stress at the vertex where it is
+    quadratic. Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
     """
     basis, mesh = body.basis, body.basis.mesh
+    volume = basis.dx.sum(axis=1)
+    if body.degree == 1:
+        element = np.sum(stress_in(body, basis, U) * basis.dx, axis=3) / volume
+        values = np.repeat(element[..., None], len(mesh.t), axis=3)
+    else:
+        corners = SHAPES[mesh.refdom.__name__][1][1].doflocs.T
+        places = skfem.Basis(mesh, basis.elem, quadrature=(corners, np.ones(corners.shape[1])))
+        values = stress_in(body, places, U)
+    vertices, count = mesh.t.T.ravel(), int(mesh.nvertices)
+    weight = np.bincount(vertices, np.repeat(volume, len(mesh.t)), count)
+    total = np.zeros((3, 3, count))
+    for i in range(3):
+        for j in range(3):
+            total[i, j] = np.bincount(vertices, (values[i, j] * volume[:, None]).ravel(), count)
+    return total / weight
+
+
+def stress_in(body: Body, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
+    """Stress tensor (3, 3, elements, points) at the quadrature points of a basis of the body."""
     lam, shear = lame(body.material)
     field = basis.interpolate(U)
     gradient = np.asarray(field.grad)
     dim = len(gradient)
     strain = np.zeros((3, 3, *gradient.shape[2:]))
     strain[:dim, :dim] = (gradient + gradient.swapaxes(0, 1)) / 2
-    if body.weight[1]:
-        strain[2, 2] = np.asarray(field)[0] / np.asarray(basis.global_coordinates())[0]
-    stress = 2 * shear * strain + lam * np.trace(strain) * np.eye(3)[:, :, None, None]
-    volume = basis.dx.sum(axis=1)
-    element = np.sum(stress * basis.dx, axis=3)  # integral over each element
-    corners = mesh.t
-    total = np.zeros((3, 3, mesh.p.shape[1]))
-    weight = np.bincount(corners.ravel(), np.tile(volume, len(corners)), mesh.p.shape[1])
-    for i in range(3):
-        for j in range(3):
-            total[i, j] = np.bincount(corners.ravel(), np.tile(element[i, j], len(corners)), mesh.p.shape[1])
-    return total / weight
+    if body.weight[1]:  # u_r / r, on the axis its limit
+        r = np.asarray(basis.global_coordinates())[0]
+        away = r > 1e-12 * r.max()
+        strain[2, 2] = np.divide(np.asarray(field)[0], r, where=away, out=gradient[0, 0].copy())
+    return np.asarray(2 * shear * strain + lam * np.trace(strain) * np.eye(3)[:, :, None, None])

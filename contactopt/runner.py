@@ -14,22 +14,28 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.edges import contact_edge, stick_edge
 from contactopt.errors import InputError
 from contactopt.methods import default_method, find_method
 from contactopt.operators import InterfaceOperator
+from contactopt.paths import PathResult, follow
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.recover import Fields, recover
 from contactopt.reduction import Reduction
 from contactopt.scene import Scene
-from contactopt.scenes import make_scene
-from contactopt.zone import contact_half_width, solve_zone, stick_half_width
+from contactopt.scenes import PATHS, make_path, make_scene
+from contactopt.zone import solve_zone
 
 Note = Callable[[str], None]
+PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work")
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """A solved scene. `summary` is what summary.json holds; `zones` the half-widths of the contact-zone loop."""
+    """A solved scene. `summary` is what summary.json holds; `zones` the half-widths of the contact-zone loop.
+
+    `path` holds all states of a scene that has a load path; the rest of the result is then that of the last state.
+    """
 
     scene: Scene
     reduction: Reduction
@@ -37,6 +43,7 @@ class Result:
     fields: tuple[Fields, ...]
     zones: tuple[float, ...]
     summary: dict[str, Any]
+    path: PathResult | None = None
 
     @property
     def problem(self) -> InterfaceProblem:
@@ -70,7 +77,8 @@ def run(
 ) -> Result:
     """Solve a scene end to end, and write its figures and files into the directory `out` if one is given.
 
-    scene     a name (see contactopt.scenes.SCENES), `changes` to its arguments; or a Scene, `changes` to its fields
+    scene     a name (see contactopt.scenes.SCENES), `changes` to its arguments, with its load path if it has one
+              (PATHS); or a Scene, `changes` to its fields
     method, normal, tangential   names; by default `auto`, or `alternating` if a backend is named
     preconditioner   of methods that take products with Q, a name in contactopt.preconditioners; selects Q = 'implicit'
     Q, solver  form of Q and solver of the bodies, see reduce()
@@ -80,7 +88,11 @@ def run(
     start = time.perf_counter()
     if elements is not None:
         changes["elements"] = elements
-    scene = make_scene(scene, **changes) if isinstance(scene, str) else _changed(scene, changes)
+    states = make_path(scene, **changes) if isinstance(scene, str) and scene in PATHS else ()
+    if isinstance(scene, str):
+        scene = states[-1] if states else make_scene(scene, **changes)
+    else:
+        scene = _changed(scene, changes)
     if preconditioner is not None and Q == "explicit":
         raise InputError("a preconditioner serves products with Q, but Q = 'explicit' was asked for; drop one of them.")
     Q = "implicit" if preconditioner is not None else Q
@@ -90,12 +102,19 @@ def run(
     chosen = find_method(method, **given)
     backends = chosen.backends(scene.dim)  # refused here, before any work, if one of them cannot be used
     target = None if out is None else _writable(Path(out))
-    reduction, solution, zones = solve_zone(scene, note=note, Q=Q, solver=solver, method=chosen, tol=tol)
+    path, zones = None, list[float]()
+    if states:
+        path = follow(states, note=note, Q=Q, solver=solver, method=chosen, tol=tol)
+        scene, reduction, solution = path.states[-1].scene, path.reduction, path.solution
+    else:
+        reduction, solution, zones = solve_zone(scene, note=note, Q=Q, solver=solver, method=chosen, tol=tol)
     seconds = dict(solution.seconds)
     with _Timer(seconds, "recover"):
         fields = recover(reduction, solution)
     summary = _summary(scene, reduction, solution, method, backends, zones)
-    result = Result(scene, reduction, solution, fields, tuple(zones), summary)
+    if path is not None:
+        summary |= {"states": len(path.states)} | {key: float(path.history[key][-1]) for key in PATH_KEYS}
+    result = Result(scene, reduction, solution, fields, tuple(zones), summary, path)
     summary["seconds"] = seconds
     if target is not None:
         note("drawing figures, writing files")
@@ -120,7 +139,7 @@ def _summary(
     zones: list[float],
 ) -> dict[str, Any]:
     problem, r = reduction.problem, solution.reactions
-    width = zones[-1] if zones else contact_half_width(scene, problem, r)
+    width = zones[-1] if zones else contact_edge(scene, problem, r)
     return {
         "scene": scene.name,
         "dofs": reduction.dofs,
@@ -132,13 +151,13 @@ def _summary(
         "status": solution.status.label,
         "residual": float(solution.residual),
         "outer_iterations": solution.iterations,
-        "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
-        "products": solution.products,
         "normal_force": float(r[:, 0].sum()),
         "approach": _approach(problem, solution),
         "contact_half_width": float(width),
-        "stick_half_width": min(float(width), stick_half_width(scene, problem, r)),
+        "stick_half_width": min(float(width), stick_edge(scene, problem, r)),
         "max_pressure": float((r[:, 0] / problem.areas).max()),
+        "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
+        "products": solution.products,
     }
 
 
@@ -198,6 +217,8 @@ def _write(result: Result, out: Path, seconds: dict[str, float], start: float) -
             for fields in result.fields:
                 fields.write_vtu(staging / f"{fields.name}.vtu")
             _write_interface(result, staging / "interface.npz")
+            if result.path is not None:
+                result.path.write(staging)
         seconds["total"] = time.perf_counter() - start
         (staging / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")
         for file in staging.iterdir():
@@ -214,6 +235,10 @@ def _draw(result: Result, folder: Path) -> None:
     picture = plots.deformed(result.scene, result.problem, result.fields)
     picture.figure.savefig(folder / "deformed.png", dpi=130)
     plots.contact_figure(result.scene, result.problem, result.solution).savefig(folder / "pressure.png", dpi=130)
+    if result.path is not None:
+        from contactopt.animation import path_figure
+
+        path_figure(result.path).savefig(folder / "path.png", dpi=130)
 
 
 def _write_interface(result: Result, path: Path) -> None:

@@ -138,6 +138,7 @@ class Scene:
     thickness  depth of a plane-strain body [length].
     copies     how many mirror images make the whole body: 2 for a half model, 4 for a quarter. Forces, nodal
                forces and nodal areas are those of all the images together, as on the ring of an axisymmetric body.
+    degree     of the displacement in every element: 1, linear, or 2, quadratic.
     bilateral  no separation: the normal displacement always equals the initial gap, the friction bound is mu |r_n|.
     elements   default number of elements across the contact half-width, for parts whose mesh is a function.
     zone       first guess of the contact half-width [length]; None when the geometry fixes the contact zone.
@@ -152,6 +153,7 @@ class Scene:
     kind: str = "plane-strain"
     thickness: float = 1.0
     copies: int = 1
+    degree: int = 1
     bilateral: bool = False
     elements: int = 16
     zone: float | None = None
@@ -168,6 +170,10 @@ class Scene:
         for name, count in (("elements", self.elements), ("copies", self.copies)):
             if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
                 raise InputError(f"scene '{self.name}': {name} must be a whole number of at least 1; got {count!r}.")
+        if self.degree not in (1, 2):
+            raise InputError(
+                f"scene '{self.name}': the degree of the displacement must be 1 or 2; got {self.degree!r}."
+            )
         if isinstance(self.upper, Rigid) and isinstance(self.lower, Rigid):
             raise InputError(f"scene '{self.name}': both bodies are rigid; at least one must be elastic.")
         for part in (self.upper, self.lower):

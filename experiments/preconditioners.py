@@ -104,12 +104,14 @@ def iterations(P: np.ndarray | LinearOperator | None, Q: Interface) -> int:
 
 
 def choices(problem: InterfaceProblem) -> dict[str, Preconditioner | None]:
-    """No preconditioner, each by itself, each with the smooth motions deflated."""
+    """No preconditioner, each by itself, each with the smooth motions deflated; without the entries of Q the best alone."""
     plain: dict[str, Preconditioner | None] = {"none": None}
     known = [name for name in PRECONDITIONERS if problem.dim == 2 or name != "p22"]
     plain |= {name: preconditioner(problem, name) for name in known}
     Z = smooth_motions(problem)
-    return plain | {f"{name}, deflated": deflated(P, problem.Q, Z) for name, P in plain.items() if P is not None}
+    if isinstance(problem.Q, np.ndarray):
+        return plain | {f"{name}, deflated": deflated(P, problem.Q, Z) for name, P in plain.items() if P is not None}
+    return {"neumann, deflated": deflated(plain["neumann"], problem.Q, Z)}
 
 
 def by_size(problem: InterfaceProblem) -> list[dict[str, object]]:
@@ -241,7 +243,7 @@ node, 5 times smaller at the ends than in the middle.
 
 **3D.** The same bodies (foundation 16 x 16 x 8, growth 1.3, the punch held on top in every direction), n x n contacts on
 the whole contact surface, P21 summed along both directions (the paper's P31); nine smooth motions deflated. From 33 x 33
-on Q is known by its products only, and bodies are solved by multigrid.
+on Q is known by its products only, and bodies are solved by multigrid; there the best preconditioner alone.
 
 {surface}
 

@@ -10,7 +10,7 @@ import contactopt
 ROOT = Path(contactopt.__file__).parent
 ORDER = [
     "errors", "scene", "analytic.reference", "analytic.normal", "analytic.panels", "analytic.spence", "analytic.friction",
-    "analytic.mindlin", "analytic.corner", "analytic", "mesh", "disc", "scenes.common", "scenes.flat", "scenes.round", "scenes.sliding", "scenes", "body", "dissection", "multigrid", "linear", "cones", "operators", "problem", "semismooth", "bonded", "cosine", "preconditioners", "krylov", "subproblems",
+    "analytic.mindlin", "analytic.corner", "analytic", "mesh", "disc", "scenes.common", "scenes.flat", "scenes.round", "scenes.sliding", "scenes", "elements", "body", "dissection", "multigrid", "linear", "cones", "operators", "problem", "semismooth", "bonded", "cosine", "preconditioners", "krylov", "subproblems",
     "balance", "mprgp", "models", "backends", "backends.qp", "backends.conic", "backends.direct", "methods",
     "methods.alternating", "methods.tresca", "methods.cone", "methods.apg", "methods.nsgs", "methods.admm",
     "methods.lagrangian", "methods.complementarity", "methods.newton", "methods.proximal",
@@ -23,6 +23,7 @@ ORDER = [
 FINITE_ELEMENTS = {
     "interface",
     "mesh",
+    "elements",
     "body",
     "condensation",
     "linear",

@@ -1,11 +1,16 @@
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from contactopt import scenes
+from contactopt import multigrid, scenes
 from contactopt.body import build_body
-from contactopt.errors import InputError
-from contactopt.linear import SOLVERS, make_solver
+from contactopt.errors import BackendError, InputError
+from contactopt.linear import LARGEST, SMALL, SOLVERS, choose, make_solver
+from contactopt.multigrid import near_neighbours, rigid_motions
 
 
 def system(scene, part, elements):
@@ -25,7 +30,7 @@ def bodies():
         "plane": system(plane, plane.lower, 16),
         "axisymmetric": system(ring, ring.upper, 8),
         "solid punch": system(solid, solid.upper, 5),
-        "solid foundation": system(solid, solid.lower, 5),
+        "solid foundation": system(solid, solid.lower, 3),
     }
 
 
@@ -62,8 +67,141 @@ def test_trailing_inverse_is_the_block_of_the_dense_inverse(name, body):
     assert np.array_equal(C, C.T)
 
 
+def energy(A, x):
+    return np.sqrt(x @ (A @ x))
+
+
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-10])
+def test_multigrid_keeps_its_word_in_the_energy_norm(body, rtol):
+    A, *_, last = args = BODIES[body]
+    b = np.zeros(A.shape[0])
+    b[last] = np.random.default_rng(0).standard_normal(len(last))
+    x = spsolve(A.tocsc(), b)
+    assert energy(A, made("multigrid", args).solve(b, rtol) - x) <= 2 * rtol * energy(A, x)
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_the_v_cycle_is_symmetric_and_close_to_the_inverse(body):
+    cycle = made("multigrid", BODIES[body]).cycle
+    B = np.stack([cycle.apply(e) for e in np.eye(cycle.A.shape[0])], axis=1)
+    assert np.abs(B - B.T).max() <= 1e-12 * np.abs(B).max()
+    L = np.linalg.cholesky(cycle.A.toarray())
+    values = np.linalg.eigvalsh(L.T @ B @ L)  # those of B A
+    assert values.min() > 0.2 and values.max() < 1.1
+
+
+@pytest.mark.parametrize(
+    "scene, part, sizes",
+    [
+        (scenes.flat_punch(2), "lower", (16, 32, 64)),
+        (scenes.sphere(), "upper", (8, 16, 32)),
+        (scenes.flat_punch(3), "upper", (4, 8, 16)),
+        (scenes.flat_punch(3), "lower", (4, 8, 16)),
+    ],
+    ids=["plane", "axisymmetric", "solid punch", "solid foundation"],
+)
+def test_iterations_of_multigrid_are_bounded_as_the_mesh_is_refined(scene, part, sizes):
+    counts = []
+    for elements in sizes:
+        A, *_, last = args = system(scene, getattr(scene, part), elements)
+        solver = made("multigrid", args)
+        b = np.zeros(A.shape[0])
+        b[last] = np.random.default_rng(0).standard_normal(len(last))
+        solver.solve(b)
+        counts.append(solver.iterations)
+    assert max(counts) <= 25 and counts[2] <= counts[1] + 4, counts
+
+
+def test_iterations_do_not_depend_on_units_and_vanish_without_load():
+    A, *rest = BODIES["solid foundation"]
+    first, second = made("multigrid", (A, *rest)), made("multigrid", (1e9 * A, *rest))
+    b = np.random.default_rng(0).standard_normal(A.shape[0])
+    np.testing.assert_allclose(1e9 * second.solve(b), first.solve(b), rtol=1e-7, atol=1e-9 * np.abs(b).max())
+    assert first.iterations == second.iterations > 0
+    assert not np.any(first.solve(0 * b)) and first.iterations == 0
+    assert first.solve(np.zeros((len(b), 0))).shape == (len(b), 0)
+
+
+def test_flat_elements_are_coarsened_along_their_short_side():
+    x, y = (c.ravel() for c in np.meshgrid(np.arange(5.0), 4.0 * np.arange(3), indexing="ij"))
+    points = np.stack([x, y])
+    touching = np.all(np.abs(points[:, :, None] - points[:, None]) <= np.array([1.0, 4.0])[:, None, None], axis=0)
+    near = near_neighbours(sp.csr_matrix(np.kron(touching, np.ones((2, 2)))).tobsr((2, 2)), points)
+    expected = touching & (y[:, None] == y)
+    assert np.array_equal(near.toarray() > 0, expected)
+
+
+@pytest.mark.parametrize("dim, count", [(2, 3), (3, 6)])
+def test_rigid_motions_strain_nothing(dim, count):
+    scene = scenes.flat_punch(dim, elements=4)
+    body = build_body(scene, scene.lower, 4, None)
+    modes = np.zeros((len(body.load), count))
+    modes[np.asarray(body.basis.nodal_dofs).T.ravel()] = rigid_motions(body.basis.mesh.p)
+    assert np.linalg.matrix_rank(modes) == count
+    assert np.abs(body.A @ modes).max() <= 1e-12 * abs(body.A).max()
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_two_bodies_in_two_threads(name):
+    systems = [BODIES["solid punch"], BODIES["solid foundation"]]
+    solvers = [made(name, args) for args in systems]
+    loads = [np.random.default_rng(0).standard_normal((args[0].shape[0], 5)) for args in systems]
+    with ThreadPoolExecutor(2) as pool:
+        answers = list(pool.map(lambda solver, b: solver.solve(b), solvers, loads))
+    for solver, b, x in zip(solvers, loads, answers):
+        np.testing.assert_allclose(x, solver.solve(b), rtol=1e-12, atol=1e-12 * np.abs(x).max())
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_products_with_the_trailing_block(name):
+    *_, last = args = BODIES["solid punch"]
+    solver = made(name, args)
+    load = np.random.default_rng(0).standard_normal((len(last), 2))
+    expected = made("superlu", args).trailing_inverse() @ load
+    limit = 1e-8 if name == "multigrid" else 1e-11
+    assert np.linalg.norm(solver.trailing_product(load) - expected) <= limit * np.linalg.norm(expected)
+    assert np.linalg.norm(solver.trailing_product(load[:, 0]) - expected[:, 0]) <= limit * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("name", ["superlu", "pardiso"])
+def test_the_order_of_the_trailing_unknowns_is_the_callers(name):
+    *system, last = BODIES["solid punch"]
+    shuffled = np.random.default_rng(0).permutation(len(last))
+    C, D = (made(name, (*system, chosen)).trailing_inverse() for chosen in (last, last[shuffled]))
+    assert np.abs(C[np.ix_(shuffled, shuffled)] - D).max() <= 1e-12 * np.abs(C).max()
+
+
+def test_choice_of_a_solver():
+    for pardiso, name in ((False, "superlu"), (True, "pardiso")):
+        assert choose(LARGEST[name], 3, pardiso) == name
+        assert choose(LARGEST[name] + 1, 3, pardiso) == "multigrid"
+        assert choose(10**6, 2, pardiso) == choose(SMALL, 3, pardiso) == "superlu"
+    assert make_solver("auto", *BODIES["plane"]).name == "superlu"
+
+
 def test_names_that_do_not_exist():
     with pytest.raises(InputError, match="unknown body solver 'cholmod'"):
         make_solver("cholmod", *BODIES["plane"])
     with pytest.raises(InputError, match="last"):
         make_solver("superlu", *BODIES["plane"][:4]).trailing_inverse()
+
+
+@pytest.mark.parametrize("name, package", [("pardiso", "pypardiso"), ("multigrid", "pyamg")])
+def test_a_missing_package_is_named(monkeypatch, name, package):
+    for module in [m for m in sys.modules if m.split(".")[0] == package] + [package]:
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(InputError, match=f"pip install {package}"):
+        make_solver(name, *BODIES["solid foundation"])
+
+
+def test_accuracy_that_cannot_be_had(monkeypatch):
+    solver = made("multigrid", BODIES["solid foundation"])
+    b = np.ones(solver.cycle.A.shape[0])
+    with pytest.raises(InputError, match="rtol"):
+        solver.solve(b, 0.0)
+    with pytest.raises(BackendError, match="multigrid"):
+        solver.solve(b * np.nan)
+    monkeypatch.setattr(multigrid, "MOST", 3)
+    with pytest.raises(BackendError, match="within 3 iterations"):
+        solver.solve(b)

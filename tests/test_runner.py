@@ -24,6 +24,8 @@ KEYS = [
     "contact_half_width",
     "stick_half_width",
     "max_pressure",
+    "q",
+    "products",
     "seconds",
 ]
 SMALL = {"punch-2d": 6, "punch-3d": 3, "sphere": 8}

@@ -1,0 +1,364 @@
+"""Meshes no finer than needed: refined until the estimated error of one quantity J is below a target.
+
+Two numbers describe a mesh: `elements` across the contact half-width, which the scene's mesh functions receive, and
+`splits`: how often the mesh made for elements / 2^splits was then halved everywhere. Elements in the contact zone have the
+same size whatever the splits; away from it every split turns a growth g of the elements into sqrt(g), and it halves
+whatever size the mesh function holds fixed. The error is taken as one part that falls with each,
+
+    J(elements, splits) - J = A elements^-p + B 2^(-p' splits),
+
+both read from differences of nested solutions (Richardson), the second on coarse meshes, where it costs little; the larger
+part is refined next. Orders are observed where there are three solutions, and held between 1/2 and 2 per degree of the displacement,
+the order of functionals of smooth solutions. Not estimated, because no refinement shows it: what finite bodies differ
+from half-spaces, and the steps of a load path.
+
+Source: Roache (1998), Verification and Validation in Computational Science and Engineering, chapter 5.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from contactopt.driver import solve
+from contactopt.elements import is_curved
+from contactopt.errors import InputError
+from contactopt.paths import PathResult, follow
+from contactopt.problem import Solution
+from contactopt.quantities import QUANTITIES, at_rim
+from contactopt.reduction import Reduction, reduce_bodies
+from contactopt.scene import Part, Scene, check_number
+from contactopt.warm import transfer
+from contactopt.zone import AGREE, LOOPS, contact_half_width, pressed
+
+COARSEST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least
+BELOW = 4  # and by how much fewer than the scene's default
+LARGEST = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about a gigabyte and half a minute
+SLOWEST = 0.5  # least order that is trusted
+STUCK = 0.1  # order below which a sequence does not converge
+SAME = 1e-12  # differences below this fraction of the value are rounding
+
+Note = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Level:
+    """One solve of the sequence. `zone` is the half-width that the mesh resolves [length], None without a zone loop."""
+
+    elements: int
+    splits: int
+    unknowns: int
+    contacts: int
+    rounds: int
+    zone: float | None
+    value: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What is known of a quantity after the last solve.
+
+    value         on the last mesh;  extrapolated: less the estimated error
+    error         estimated, relative to the value;  mesh_error, grading_error: its two parts, signed
+    order         observed of the first part, nan if the sequence is not monotone
+    reached       whether error <= target;  message: one sentence
+    levels        in the order they were solved
+    """
+
+    quantity: str
+    target: float
+    value: float
+    extrapolated: float
+    error: float
+    mesh_error: float
+    grading_error: float
+    order: float
+    reached: bool
+    message: str
+    levels: tuple[Level, ...]
+
+    def summary(self) -> dict[str, Any]:
+        """As plain numbers and words, for JSON."""
+        return asdict(self) | {"levels": [asdict(level) for level in self.levels]}
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A solved mesh: `path` if the scene has one, `zones` of the zone loop."""
+
+    level: Level
+    reduction: Reduction
+    solution: Solution
+    zones: tuple[float, ...] = ()
+    path: PathResult | None = None
+
+
+def refine(
+    states: Sequence[Scene],
+    quantity: str,
+    accuracy: float,
+    note: Note = lambda text: None,
+    Q: str = "auto",
+    solver: str = "auto",
+    **settings: Any,
+) -> tuple[Solved, Estimate]:
+    """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
+
+    quantity  a name in QUANTITIES;  accuracy  bound on its estimated relative error, between 0 and 1
+    Q, solver, settings  as for solve_zone()
+    Ends short of the target, with a sentence in the estimate, where the quantity does not converge, the next mesh would have
+    more than LARGEST unknowns, or a solve fails. Raises InputError for an unknown quantity or an accuracy out of range.
+    """
+    if quantity not in QUANTITIES:
+        raise InputError(f"unknown quantity {quantity!r}; choose from {', '.join(QUANTITIES)}.")
+    check_number("the accuracy", accuracy, low=0.0, high=1.0)
+    search = _Search(tuple(states), quantity, note, {"Q": Q, "solver": solver} | settings)
+    while True:
+        mesh, order, grading = *search.mesh_error(), search.grading_error()
+        size = max(abs(mesh + grading), abs(mesh) / 2, abs(grading) / 2)
+        error = size / max(abs(search.value), SAME * size) if size else 0.0
+        note(f"{quantity} {search.value:.6g}, estimated error {error:.1e}")
+        message = search.obstacle()
+        if message or error <= accuracy:
+            break
+        message = search.finer_grading() if abs(grading) > abs(mesh) else search.finer_mesh()
+        if message:
+            break
+    last = search.final()
+    message = message or ("" if last.solution.solved else search.unsolved(last))
+    value, scale = last.level.value, abs(search.value) or 1.0
+    estimate = Estimate(
+        quantity,
+        accuracy,
+        value,
+        value - mesh - grading,
+        float(error),
+        mesh / scale,
+        grading / scale,
+        order,
+        not message,
+        message or f"the estimated error of the {quantity} is below the target",
+        tuple(search.levels),
+    )
+    return last, estimate
+
+
+def remainder(before: float | None, last: float, best: float) -> tuple[float, float]:
+    """Sum of all further differences of a sequence under halving, and its order, nan if unknown.
+
+    before, last  its last two differences: the order is log2(before / last), held within SLOWEST and `best`. Never
+    less than what `best` leaves of the difference before, since a small last one may be luck; where the two have
+    opposite signs the remainder is as large as the last difference, or a quarter of the one before.
+    """
+    if before is None or before == 0 or last == 0:
+        size, order = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1), np.nan
+    elif before / last < 0:
+        size, order = max(abs(last), abs(before) / 4), np.nan
+    else:
+        order = float(np.log2(before / last))
+        size = max(abs(last) / (2 ** np.clip(order, SLOWEST, best) - 1), abs(before) / 2**best / (2**best - 1))
+    return float(np.copysign(size, last)), order
+
+
+class _Search:
+    """The nested solves and what they say. The last of `meshes`, with `splits`, is the mesh in question.
+
+    meshes   levels of the main sequence: doubled elements without splits, or, where the meshes are given, splits alone
+    changes  of the value by the first split, the second, ...: those of the present splits, and at least one
+    """
+
+    def __init__(self, states: tuple[Scene, ...], quantity: str, note: Note, options: dict[str, Any]):
+        self.states, self.quantity, self.note, self.options = states, quantity, note, options
+        scene = states[-1]
+        self.given = not all(callable(part.mesh) for part in _parts(scene))
+        self.first = scene.elements if self.given else max(COARSEST[scene.dim], scene.elements // BELOW)
+        self.best = 2 * scene.degree
+        self.levels: list[Level] = []
+        self.meshes: list[Level] = []
+        self.changes: list[float] = []
+        self.splits = 0
+        self.last: Solved | None = None
+        self.split_last: Solved | None = None
+        for _ in range(3):
+            self._refine_mesh()
+        if scene.dim == 2 and not self.given:
+            self._split()
+
+    @property
+    def value(self) -> float:
+        return self.meshes[-1].value
+
+    def mesh_error(self) -> tuple[float, float]:
+        """Of the value on the last mesh, signed [unit of the quantity], and its order."""
+        before, last = np.diff([level.value for level in self.meshes[-3:]])
+        rest, order = remainder(before, last, self.best)
+        return -rest, order
+
+    def grading_error(self) -> float:
+        """Of the meshes with the present splits, signed."""
+        if not self.changes:
+            return 0.0
+        before = self.changes[-2] if len(self.changes) > 1 else None
+        rest = remainder(before, self.changes[-1], self.best)[0]
+        return -rest - sum(self.changes[self.splits :])
+
+    def obstacle(self) -> str:
+        """Why it would be in vain to go on, or nothing."""
+        assert self.last is not None
+        if not self.last.solution.solved:
+            return self.unsolved(self.last)
+        if self.quantity == "pressure" and at_rim(self.last.reduction, self.last.solution):
+            return "the largest pressure is at the edge of the contact surface, a corner, where no mesh bounds it"
+        steps = np.diff([level.value for level in self.meshes])
+        steps = steps * np.sign(steps[-1])
+        if len(steps) > 2 and np.all(steps[-2:] > 2**-STUCK * np.abs(steps[-3:-1])):
+            return f"the {self.quantity} does not converge: every refinement changes it by as much as the one before"
+        return ""
+
+    def unsolved(self, solved: Solved) -> str:
+        return f"the mesh of {solved.level.unknowns} unknowns was not solved: {solved.solution.message}"
+
+    def finer_mesh(self) -> str:
+        """Refine the last mesh; or the reason not to."""
+        growth = self.meshes[-1].unknowns / self.meshes[-2].unknowns
+        reason = self._too_large(growth, self.splits)
+        if not reason:
+            self._refine_mesh()
+        return reason
+
+    def finer_grading(self) -> str:
+        """One split more; or the reason not to."""
+        if reason := self._too_large(1.0, self.splits + 1):
+            return reason
+        self.splits += 1
+        if self.splits > len(self.changes):
+            self._split()
+        return ""
+
+    def final(self) -> Solved:
+        """The last mesh with the present splits."""
+        assert self.last is not None
+        wanted = self.last.level.elements, self.last.level.splits if self.given else self.splits
+        for solved in (self.last, self.split_last):
+            if solved is not None and (solved.level.elements, solved.level.splits) == wanted:
+                return solved
+        return self._solve(*wanted)
+
+    def _too_large(self, growth: float, splits: int) -> str:
+        dim = self.states[-1].dim
+        unknowns = growth * self.meshes[-1].unknowns * 2 ** (dim * splits)
+        if unknowns <= LARGEST[dim]:
+            return ""
+        return f"to go on would take up to {unknowns:.2g} unknowns, more than {LARGEST[dim]:,}"
+
+    def _refine_mesh(self) -> None:
+        i = len(self.meshes)
+        self.last = self._solve(self.first if self.given else self.first * 2**i, i if self.given else 0)
+        self.meshes.append(self.last.level)
+
+    def _split(self) -> None:
+        """Measure the change by the next split, on meshes made of the first one."""
+        splits = len(self.changes) + 1
+        elements = self.first * 2**splits
+        known = {(level.elements, level.splits): level.value for level in self.levels}
+        if (elements, splits - 1) not in known:
+            known[elements, splits - 1] = self._solve(elements, splits - 1).level.value
+        self.split_last = self._solve(elements, splits)
+        self.changes.append(self.split_last.level.value - known[elements, splits - 1])
+
+    def _solve(self, elements: int, splits: int) -> Solved:
+        self.note(f"{elements} elements across the half-width" + (f", {splits} splits" if splits else ""))
+        begin = time.perf_counter()
+        base = elements if self.given else elements // 2**splits
+        states = [_split_scene(scene, base, splits) for scene in self.states]
+        if len(states) > 1:
+            path = follow(states, elements, **self.options)
+            reduction, solution, zones = path.reduction, path.solution, list[float]()
+        else:
+            path = None
+            reduction, solution, zones = self._zone_loop(states[0], elements)
+        value = QUANTITIES[self.quantity](reduction, solution)
+        zone = zones[-2] if len(zones) > 1 else None
+        seconds, rounds = time.perf_counter() - begin, max(1, len(zones) - 1)
+        level = Level(elements, splits, reduction.dofs, reduction.problem.contacts, rounds, zone, value, seconds)
+        self.levels.append(level)
+        return Solved(level, reduction, solution, tuple(zones), path)
+
+    def _zone_loop(self, scene: Scene, elements: int) -> tuple[Reduction, Solution, list[float]]:
+        """As solve_zone(), from the last mesh's zone and solution."""
+        before, seconds = self.last, Counter[str]()
+        known = before.zones[-1:] if before is not None else ()
+        zones = list(known) or ([] if scene.zone is None else [scene.zone])
+        source = None if before is None else (before.reduction.problem, before.solution)
+        while True:
+            reduction = reduce_bodies(scene, elements, zones[-1] if zones else None, **self._forms)
+            start = None if source is None else transfer(*source, reduction.problem)
+            solution = solve(reduction.problem, start=start, **self._settings)
+            source = reduction.problem, solution
+            seconds.update(reduction.seconds)
+            seconds.update(solution.seconds)
+            solution = replace(solution, seconds=dict(seconds))
+            if not zones:
+                return reduction, solution, zones
+            if pressed(solution.reactions).sum() < 2:
+                raise InputError(f"scene '{scene.name}': fewer than two nodes are in contact; take more elements.")
+            zones.append(contact_half_width(scene, reduction.problem, solution.reactions))
+            agreed = abs(zones[-1] - zones[-2]) <= AGREE * zones[-2] / elements
+            if agreed or not solution.solved or len(zones) > LOOPS:
+                return reduction, solution, zones
+
+    @property
+    def _forms(self) -> dict[str, Any]:
+        return {key: self.options[key] for key in ("Q", "solver")}
+
+    @property
+    def _settings(self) -> dict[str, Any]:
+        return {key: value for key, value in self.options.items() if key not in ("Q", "solver")}
+
+
+def _parts(scene: Scene) -> list[Part]:
+    return [part for part in (scene.upper, scene.lower) if isinstance(part, Part)]
+
+
+def _split_scene(scene: Scene, elements: int, splits: int) -> Scene:
+    """The scene on the meshes for `elements`, halved `splits` times."""
+
+    def finer(part: Any) -> Any:
+        if not isinstance(part, Part):
+            return part
+
+        def mesh(_: int, zone: float | None) -> Any:
+            made = part.build_mesh(elements, zone)
+            for _ in range(splits):
+                made = split(made, part.contact)
+            return made
+
+        return replace(part, mesh=mesh)
+
+    return replace(scene, upper=finer(scene.upper), lower=finer(scene.lower)) if splits else scene
+
+
+def split(mesh: Any, contact: str) -> Any:
+    """The mesh with all elements halved; in the plane, new nodes of a curved contact boundary lie on a cubic spline.
+
+    The spline gives the height over the coordinate along which the boundary extends most, so that partners on
+    two bodies stay partners. Raises InputError for meshes with curved elements.
+    """
+    if is_curved(mesh):
+        raise InputError("meshes with curved elements cannot be refined here; give a mesh function of `elements`.")
+    fine = mesh.refined(1)
+    if len(mesh.p) > 2:
+        return fine
+    old, new = (np.unique(m.facets[:, m.boundaries[contact]]) for m in (mesh, fine))
+    along = int(np.argmax(np.ptp(mesh.p[:, old], axis=1)))
+    order = old[np.argsort(mesh.p[along, old])]
+    p = fine.p.copy()
+    p[1 - along, new] = CubicSpline(mesh.p[along, order], mesh.p[1 - along, order])(p[along, new])
+    return replace(fine, doflocs=p)

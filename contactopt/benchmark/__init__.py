@@ -1,0 +1,70 @@
+"""Benchmarks: an experiment file -> runs in processes of their own -> a table -> figures and reports.
+
+    >>> from contactopt import benchmark
+    >>> folder = benchmark.run_campaign("friction.toml", jobs=2)
+    >>> table = benchmark.load(folder)          # pandas.DataFrame, one row per run; columns: benchmark.COLUMNS
+
+An experiment file names problems, methods and settings; lists and ranges are multiplied out:
+
+    name = "friction"
+    plugins = ["mine.py"]                       # files beside this one
+    settings = ["low", "mid", "high", 1e-7]     # bounds on the certificate: 1e-3, 1e-6, 1e-9; "default": the method's own
+    repeats = 3
+    time_limit = 10.0                           # s per run, enforced
+    [[problems]]
+    scene = "punch-2d"
+    mu = {from = 0.1, to = 10.0, steps = 5, scale = "log"}
+    elements = [8, 16]
+    [[problems]]
+    fclib = "${FCLIB}/*.hdf5"                   # a folder that the environment names
+    optional = true                             # left out where it is missing
+    [[methods]]
+    method = ["auto", "nsgs", "mine"]
+
+A method of your own is a function in `mine.py`; nothing in this package changes:
+
+    import numpy as np
+    from contactopt.benchmark import method
+
+    @method
+    def mine(problem, tol=1e-8, steps=1000):    # settings are arguments; tol, time_limit, start are passed if asked for
+        r = np.zeros(problem.q.shape)
+        ...
+        return r                                # or (r, multipliers), or a contactopt.Solution
+
+Instead of a function it may be a dataclass with `iterate`, as in contactopt.methods: it then gets the driver's stopping
+rule and history. `@problem` registers a function that makes an InterfaceProblem in the same way, for `family = NAME`.
+An installed package offers methods as entry points of the group "contactopt.methods". What a method claims is never
+believed: each answer gets the certificate of contactopt.natural_map_residual.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from contactopt.benchmark.campaign import run_campaign, run_reports  # noqa: F401
+    from contactopt.benchmark.experiment import Experiment, read_experiment  # noqa: F401
+    from contactopt.benchmark.plugins import method, problem  # noqa: F401
+    from contactopt.benchmark.store import COLUMNS, STATUSES, load, save  # noqa: F401
+
+_HOMES = {
+    "campaign": ("run_campaign", "run_reports"),
+    "experiment": ("Experiment", "read_experiment"),
+    "plugins": ("method", "problem"),
+    "store": ("COLUMNS", "STATUSES", "load", "save"),
+}
+_MODULES = ("figures", "report", "tables")
+__all__ = sorted([*(name for names in _HOMES.values() for name in names), *_MODULES])
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f"contactopt.benchmark.{name}")
+    for module, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f"contactopt.benchmark.{module}"), name)
+    raise AttributeError(f"module 'contactopt.benchmark' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,119 @@
+"""A campaign: the runs of an experiment that are not finished yet, executed, stored one by one, consolidated."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+
+from contactopt.benchmark.experiment import Experiment, NothingToRun, read_experiment
+from contactopt.benchmark.measure import Task
+from contactopt.benchmark.pool import run_locally, run_on_cluster
+from contactopt.benchmark.report import build, publish
+from contactopt.benchmark.store import Store, load, save
+from contactopt.errors import InputError
+
+
+def run_campaign(
+    experiment: str | Path | Experiment,
+    out: str | Path | None = None,
+    *,
+    jobs: int | None = None,
+    resume: bool = False,
+    filters: Sequence[str] = (),
+    scheduler: str | None = None,
+    quiet: bool = False,
+) -> Path:
+    """Execute an experiment; returns the folder with its results, out/bench/NAME by default.
+
+    jobs       worker processes; default: one per core
+    resume     go on where an interrupted campaign stopped: no finished run is repeated
+    filters    "COLUMN=PATTERN" on problem, method, setting, start or repeat; all must match
+    scheduler  address of a Dask scheduler, instead of local processes
+    Raises InputError on an experiment that cannot be run, or results in the folder without `resume`.
+    """
+    if not isinstance(experiment, Experiment):
+        experiment = read_experiment(experiment)
+    if jobs is not None and jobs < 1:
+        raise InputError(f"jobs must be at least 1; got {jobs}.")
+    folder = Path(out) if out is not None else Path("out/bench") / experiment.name
+    runs = experiment.runs(filters)
+    if not runs:
+        raise InputError("no run matches the filters.")
+    e = experiment
+    limits = (e.time_limit, e.memory_limit, e.max_iterations, e.seed, e.diagnose)
+    try:
+        store = Store(folder, resume)
+    except OSError as error:
+        raise InputError(f"cannot write into '{folder}': {error.strerror}.") from error
+    with store:
+        if experiment.path.is_file():
+            shutil.copy(experiment.path, folder / "experiment.toml")
+        finished = store.finished()
+        tasks = [Task(run, experiment.name, experiment.plugins, *limits) for run in runs if run.key not in finished]
+        rows = run_on_cluster(tasks, scheduler) if scheduler else run_locally(tasks, jobs or os.cpu_count() or 1)
+        _execute(experiment, store, tasks, len(runs), rows, quiet)
+        save(load(store.path), folder / "rows.parquet")
+    return folder
+
+
+def run_reports(
+    experiments: Sequence[str | Path],
+    reports: str | Path,
+    version: str = "",
+    names: Sequence[str] = (),
+    jobs: int | None = None,
+    quiet: bool = False,
+) -> Path:
+    """Rebuild all reports from their tables; returns the page with all of them.
+
+    version  "": solve nothing.  "full": run the experiments first and renew their tables in `reports`.  "quick": run their
+             quick versions, with tables and reports in out/quick, so that `reports` stays as it is
+    names    stems of the experiment files to run; all by default
+    Experiments whose problems or methods are all missing here are left out, with a note. Raises InputError as run_campaign.
+    """
+    paths = [Path(path) for path in experiments]
+    missing = set(names) - {path.stem for path in paths}
+    if version not in ("", "quick", "full") or missing:
+        wrong = (
+            f"version {version!r}; choose quick or full"
+            if not missing
+            else f"experiments: {', '.join(sorted(missing))}"
+        )
+        raise InputError(f"unknown {wrong}.")
+    work = Path("out") / (version or "bench")
+    target = work / "reports" if version == "quick" else Path(reports)
+    for path in paths if version else ():
+        if names and path.stem not in names:
+            continue
+        try:
+            experiment = read_experiment(path, quick=version == "quick")
+        except NothingToRun as error:
+            print(f"left out: {error}", file=sys.stderr)
+            continue
+        folder = work / experiment.name
+        shutil.rmtree(folder, ignore_errors=True)
+        publish(path, run_campaign(experiment, folder, jobs=jobs, quiet=quiet), target)
+    return build(paths, target)
+
+
+def _execute(experiment, store, tasks, total, rows, quiet) -> None:  # type: ignore[no-untyped-def]
+    from tqdm import tqdm
+
+    failed: Counter[str] = Counter()
+    with (
+        closing(rows),
+        tqdm(
+            total=total, initial=total - len(tasks), desc=experiment.name, unit="run", file=sys.stderr, disable=quiet
+        ) as bar,
+    ):
+        for row in rows:
+            store.append(row)
+            if not row["success"]:
+                failed[row["status"]] += 1
+                bar.set_postfix_str(", ".join(f"{n} {status}" for status, n in failed.most_common()), refresh=False)
+            bar.update()

@@ -1,0 +1,267 @@
+"""Experiment files: TOML -> validated problems, methods and settings -> runs. Errors name the file and the line."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from fnmatch import fnmatchcase
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.benchmark.plugins import load_plugins
+from contactopt.benchmark.problems import KINDS, ProblemSpec, named
+from contactopt.benchmark.runs import SETTINGS, STARTS, MethodSpec, Run
+from contactopt.errors import InputError
+from contactopt.scene import check_number
+
+
+class NothingToRun(InputError):
+    """All problems or all methods of an experiment are optional and missing here."""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One experiment file. Its fields are the keys of the file; lists and ranges in problems and methods are expanded.
+
+    plugins       files, relative to the experiment file
+    settings      names of SETTINGS or bounds on the certificate
+    starts        "cold", "warm": from the certified solution at nine tenths of the load and of the friction
+    time_limit    [s] wall clock of one run; memory_limit [GB] of data of its process
+    seed          of NumPy's and Python's generators before each run
+    diagnose      rank, condition and thresholds of friction with each problem (contactopt.diagnose)
+    quick         keys that a quick version replaces
+    figures       of the report, see contactopt.benchmark.report; findings: file with a function findings(table)
+    """
+
+    name: str
+    problems: tuple[ProblemSpec, ...]
+    methods: tuple[MethodSpec, ...]
+    title: str = ""
+    text: str = ""
+    plugins: tuple[str, ...] = ()
+    settings: tuple[str | float, ...] = ("default",)
+    starts: tuple[str, ...] = ("cold",)
+    repeats: int = 1
+    time_limit: float = 60.0
+    memory_limit: float = 4.0
+    max_iterations: int = 100_000
+    seed: int = 0
+    diagnose: bool = False
+    quick: Mapping[str, Any] = field(default_factory=dict)
+    figures: tuple[Mapping[str, Any], ...] = ()
+    findings: str = ""
+    columns: tuple[str, ...] = ()
+    path: Path = Path()
+    skipped: tuple[str, ...] = ()
+
+    def runs(self, filters: Sequence[str] = ()) -> list[Run]:
+        """All runs, those of a problem together; filters: COLUMN=PATTERN, of which all must match."""
+        chosen = [_filter(text) for text in filters]
+        runs = [
+            Run(problem, method, str(setting), SETTINGS.get(str(setting)) or float(setting), start, repeat)
+            for problem in self.problems
+            for repeat, setting, start, method in product(range(self.repeats), self.settings, self.starts, self.methods)
+        ]
+        return [run for run in runs if all(match(run) for match in chosen)]
+
+
+def _filter(text: str) -> Any:
+    columns = ("problem", "method", "setting", "start", "repeat")
+    column, sign, pattern = text.partition("=")
+    if column not in columns or not sign:
+        raise InputError(f"cannot filter by '{text}'; write COLUMN=PATTERN with a column of {', '.join(columns)}.")
+
+    def match(run: Run) -> bool:
+        value = getattr(run, column)
+        texts = (value.name, value.label) if column in ("problem", "method") else (str(value),)
+        return any(fnmatchcase(text, pattern) for text in texts)
+
+    return match
+
+
+def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
+    """The experiment in a TOML file, `quick`: with its quick version's keys.
+
+    Raises InputError, naming file and line, on anything that cannot be run.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text()
+        data = tomllib.loads(text)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the experiment '{path}': {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"'{path}' is not valid TOML: {error}") from error
+    reader = _Reader(path, text, "quick" if quick else "")
+    if quick:
+        data |= data.get("quick", {})
+    return reader.experiment(data)
+
+
+class _Reader:
+    """Checks one file's keys; every complaint goes through `located`, which finds the line."""
+
+    def __init__(self, path: Path, text: str, prefix: str):
+        self.path, self.lines, self.prefix = path, text.splitlines(), prefix
+
+    def experiment(self, data: dict[str, Any]) -> Experiment:
+        known = {f.name: f for f in fields(Experiment)}
+        for key in data:
+            if key not in known or key in ("path", "skipped"):
+                raise self.located(f"unknown key {key!r}", key)
+        for key in ("name", "problems", "methods"):
+            if not data.get(key):
+                raise self.located(f"an experiment needs '{key}'", key)
+        data = {key: tuple(value) if isinstance(value, list) else value for key, value in data.items()}
+        self.scalars(data)
+        paths = tuple(str((self.path.parent / plugin).resolve()) for plugin in data.get("plugins", ()))
+        self.guard("plugins", load_plugins, paths)
+        skipped: list[str] = []
+        problems = [p for i, entry in enumerate(data["problems"]) for p in self.problems(i, entry, skipped)]
+        methods = [m for i, entry in enumerate(data["methods"]) for m in self.methods(i, entry, skipped)]
+        for title, specs in (("problems", problems), ("methods", methods)):
+            twice = [label for label, n in Counter(spec.label for spec in specs).items() if n > 1]
+            if twice:
+                raise self.located(f"two {title} are called {twice[0]!r}", title)
+        if not problems or not methods:
+            raise NothingToRun(f"'{self.path}': nothing is left to run; " + " ".join(skipped))
+        return Experiment(
+            **data
+            | dict(problems=tuple(problems), methods=tuple(methods), plugins=paths, path=self.path)
+            | dict(skipped=tuple(skipped))
+        )
+
+    def scalars(self, data: Mapping[str, Any]) -> None:
+        for key, kind in (("name", str), ("title", str), ("text", str), ("findings", str), ("quick", dict)):
+            if not isinstance(data.get(key, kind()), kind):
+                raise self.located(f"'{key}' must be a {'table' if kind is dict else 'text'}", key)
+        if not re.fullmatch(r"[\w.-]+", data["name"]):
+            raise self.located("'name' becomes a directory: letters, digits, '-', '_' and '.' only", "name")
+        for key in ("plugins", "settings", "starts", "problems", "methods", "figures", "columns"):
+            if not isinstance(data.get(key, ()), tuple):
+                raise self.located(f"'{key}' must be a list", key)
+        for key in ("repeats", "max_iterations", "seed"):
+            value = data.get(key, 1)
+            if not isinstance(value, int) or isinstance(value, bool) or value < (key != "seed"):
+                raise self.located(f"'{key}' must be a whole number; got {value!r}", key)
+        if not isinstance(data.get("diagnose", False), bool):
+            raise self.located("'diagnose' must be true or false", "diagnose")
+        for key in ("time_limit", "memory_limit"):
+            self.guard(key, check_number, f"'{key}'", data.get(key, 1.0), 0.0)
+        for setting in data.get("settings", ()):
+            if isinstance(setting, str) and setting not in SETTINGS:
+                raise self.located(
+                    f"unknown setting {setting!r}; choose from {', '.join(SETTINGS)} or a number", "settings"
+                )
+            if not isinstance(setting, str):
+                self.guard("settings", check_number, "a setting", setting, 0.0)
+        for start in data.get("starts", ()):
+            if start not in STARTS:
+                raise self.located(f"unknown start {start!r}; choose from {', '.join(STARTS)}", "starts")
+
+    def problems(self, index: int, entry: Any, skipped: list[str]) -> Iterator[ProblemSpec]:
+        kinds = [kind for kind in KINDS if isinstance(entry, dict) and kind in entry]
+        if len(kinds) != 1:
+            raise self.located(f"a problem needs one of {', '.join(KINDS)}", "problems", index)
+        for name, parameters in self.expand("problems", index, entry, kinds[0], skipped):
+            try:
+                found = named(kinds[0], name, parameters, self.path.parent)
+                for spec in found:
+                    spec.check()
+            except InputError as error:
+                self.refuse(error, "problems", index, entry, kinds[0], skipped)
+            else:
+                yield from found
+
+    def methods(self, index: int, entry: Any, skipped: list[str]) -> Iterator[MethodSpec]:
+        if not isinstance(entry, dict) or "method" not in entry:
+            raise self.located("a method needs the key 'method'", "methods", index)
+        for name, settings in self.expand("methods", index, entry, "method", skipped):
+            spec = MethodSpec(name, settings)
+            try:
+                spec.check()
+            except InputError as error:
+                self.refuse(error, "methods", index, entry, "method", skipped)
+            else:
+                yield spec
+
+    def expand(
+        self, table: str, index: int, entry: Mapping[str, Any], kind: str, skipped: list[str]
+    ) -> Iterator[tuple[str, dict[str, Any]]]:
+        """(name, parameters) of every combination of the entry's lists and ranges."""
+        names = entry[kind] if isinstance(entry[kind], list) else [entry[kind]]
+        rest = {key: value for key, value in entry.items() if key not in (kind, "optional")}
+        choices = []
+        for key, value in rest.items():
+            try:
+                choices.append(values_of(key, value))
+            except InputError as error:
+                raise self.located(str(error), table, index, key) from error
+        for name, *values in product(names, *choices):
+            if not isinstance(name, str):
+                raise self.located(f"'{kind}' must be a name", table, index, kind)
+            yield name, dict(zip(rest, values))
+
+    def refuse(
+        self, error: InputError, table: str, index: int, entry: Mapping[str, Any], kind: str, skipped: list[str]
+    ) -> None:
+        if not entry.get("optional"):
+            words = {
+                key: [key, *(v for v in np.atleast_1d(value) if isinstance(v, str))] for key, value in entry.items()
+            }
+            blamed = (
+                k for k, names in words.items() if any(re.search(rf"\b{re.escape(n)}\b", str(error)) for n in names)
+            )
+            culprit = next((key for key in blamed if key != kind), kind)
+            raise self.located(str(error), table, index, culprit) from error
+        skipped.append(str(error))
+
+    def guard(self, key: str, function: Any, *arguments: Any) -> None:
+        try:
+            function(*arguments)
+        except InputError as error:
+            raise self.located(str(error), key) from error
+
+    def located(self, message: str, table: str, index: int = 0, key: str = "") -> InputError:
+        """The error with its line: that of `key` in the index-th [[table]], or of the table, or of the top-level key."""
+        prefix = f"{self.prefix}." if any(f"[[{self.prefix}.{table}]]" in line for line in self.lines) else ""
+        head = re.compile(rf"\s*(\[\[{re.escape(prefix + table)}\]\]|{re.escape(table)}\s*=)")
+        places = [n for n, line in enumerate(self.lines) if head.match(line)]
+        line = None
+        if places:
+            line = places[min(index, len(places) - 1)]
+            for n in range(line + 1, len(self.lines)):
+                if not key or self.lines[n].lstrip().startswith("["):
+                    break
+                if re.match(rf"\s*{re.escape(key)}\s*=", self.lines[n]):
+                    line = n
+                    break
+        where = f"'{self.path}'" + (f", line {line + 1}" if line is not None else "")
+        return InputError(f"{where}: {message.rstrip('.')}.")
+
+
+def values_of(name: str, value: Any) -> list[Any]:
+    """One value, a list of them, or a range {from, to, steps, scale = "linear" or "log"}."""
+    if isinstance(value, list):
+        if not value:
+            raise InputError(f"the list '{name}' is empty")
+        return value
+    if not isinstance(value, dict):
+        return [value]
+    if not {"from", "to", "steps"} <= set(value) or set(value) - {"from", "to", "steps", "scale"}:
+        raise InputError(f"the range '{name}' needs from, to, steps, and may have scale = \"log\"")
+    scales: dict[str, Callable[..., np.ndarray]] = {"linear": np.linspace, "log": np.geomspace}
+    spaced = scales.get(value.get("scale", "linear"))
+    if spaced is None or not isinstance(value["steps"], int) or value["steps"] < 1:
+        raise InputError(f'the range \'{name}\' needs whole steps >= 1 and scale "linear" or "log"')
+    if spaced is np.geomspace and not (value["from"] > 0 and value["to"] > 0):
+        raise InputError(f"the logarithmic range '{name}' needs bounds above 0")
+    numbers = [float(f"{x:.6g}") for x in spaced(value["from"], value["to"], value["steps"])]
+    whole = isinstance(value["from"], int) and isinstance(value["to"], int)
+    return list(dict.fromkeys(round(x) for x in numbers)) if whole else numbers

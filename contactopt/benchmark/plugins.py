@@ -1,0 +1,98 @@
+"""Methods and problems of the user: decorated in a file that the experiment names, or entry points of a package."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any
+
+from contactopt.errors import InputError
+from contactopt.methods import METHODS
+
+GROUP = "contactopt.methods"  # of entry points
+LAWS = ("coulomb", "associated")
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """make: a function problem -> answer, or a class whose objects have `iterate` (contactopt.methods.Method)."""
+
+    name: str
+    make: Callable[..., Any]
+    law: str = "coulomb"
+
+    @property
+    def iterates(self) -> bool:
+        return hasattr(self.make, "iterate")
+
+
+_methods: dict[str, Plugin] = {}
+_problems: dict[str, Callable[..., Any]] = {}
+_loaded: set[Path] = set()
+
+
+def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -> Any:
+    """Register a function or class as a method of the benchmark, under its own name or `name`.
+
+    A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s], `max_iterations` and `start`
+    (a Solution or None) are passed if it has such arguments, `tol` not at the setting "default" if it has a default. It
+    returns reactions (k, dim), or (reactions, multipliers), or a Solution. Returning claims success; raising
+    does not, and InputError means that the problem is not one for this method.
+    law  "coulomb", or "associated" for the convex relaxation: rows are judged by, and profiles compare within, one law
+    """
+    if law not in LAWS:
+        raise InputError(f"law must be one of {', '.join(LAWS)}; got {law!r}.")
+
+    def register(make: Any) -> Any:
+        plugin = Plugin(name or make.__name__, make, law)
+        if plugin.name in METHODS:
+            raise InputError(f"plug-in method {plugin.name!r} has the name of a method of contactopt; rename it.")
+        _methods[plugin.name] = plugin
+        return make
+
+    return register if make is None else register(make)
+
+
+def problem(make: Any = None, *, name: str | None = None) -> Any:
+    """Register a function of named parameters that returns an InterfaceProblem, for `family = NAME`."""
+
+    def register(make: Any) -> Any:
+        _problems[name or make.__name__] = make
+        return make
+
+    return register if make is None else register(make)
+
+
+def load_plugins(paths: Iterable[str | Path]) -> None:
+    """Run plug-in files once per process; InputError, naming the file, if one fails."""
+    for path in map(Path, paths):
+        if path in _loaded:
+            continue
+        digest = hashlib.sha256(str(path).encode()).hexdigest()[:8]
+        spec = spec_from_file_location(f"contactopt_plugin_{path.stem}_{digest}", path)
+        if spec is None or spec.loader is None or not path.is_file():
+            raise InputError(f"plug-in '{path}' is not a Python file.")
+        module = module_from_spec(spec)
+        sys.modules[spec.name] = module  # dataclasses look their module up
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:
+            raise InputError(f"plug-in '{path}' failed: {type(error).__name__}: {error}") from error
+        _loaded.add(path)
+
+
+def find_plugin(name: str) -> Plugin | None:
+    """The plug-in method of that name, from a loaded file or an entry point; None if there is none."""
+    if name not in _methods:
+        for point in entry_points(group=GROUP, name=name):
+            _methods[name] = Plugin(name, point.load())
+    return _methods.get(name)
+
+
+def plugin_problems() -> dict[str, Callable[..., Any]]:
+    return _problems

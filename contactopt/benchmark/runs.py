@@ -1,0 +1,109 @@
+"""What is run: a problem, a method, a setting, a start, a repeat."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Any
+
+from contactopt.backends import CONIC, QP
+from contactopt.benchmark.plugins import Plugin, find_plugin
+from contactopt.benchmark.problems import ProblemSpec, short_number
+from contactopt.errors import InputError
+from contactopt.methods import METHODS, NATIVE, find_method
+
+DEFAULT_TOL = 1e-8  # by which the setting "default" is judged: that of contactopt.solve
+SETTINGS = {"default": DEFAULT_TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}
+STARTS = ("cold", "warm")
+PASSED = ("tol", "time_limit", "max_iterations", "start")  # to a plug-in, if it has such an argument
+OTHER_LAWS = {"relaxation": "associated"}  # methods of contactopt that solve another problem than Coulomb's
+
+
+@dataclass(frozen=True)
+class MethodSpec:
+    """A method of contactopt or a plug-in, with the settings that were given."""
+
+    name: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def label(self) -> str:
+        texts = {k: short_number(v) if isinstance(v, float) else repr(v) for k, v in self.settings.items()}
+        given = ", ".join(f"{key}={text}" for key, text in texts.items())
+        return f"{self.name}({given})" if given else self.name
+
+    @property
+    def plugin(self) -> Plugin | None:
+        return None if self.name in METHODS else find_plugin(self.name)
+
+    @property
+    def law(self) -> str:
+        return self.plugin.law if self.plugin is not None else OTHER_LAWS.get(self.name, "coulomb")
+
+    def check(self) -> None:
+        """InputError if the name or a setting is unknown, or a backend is not installed."""
+        if self.name not in METHODS and self.plugin is None:
+            raise InputError(
+                f"unknown method {self.name!r}; choose from {', '.join(METHODS)}, or name its plug-in file."
+            )
+        if self.plugin is not None:
+            wanted = inspect.signature(self.plugin.make)
+            given = {name: None for name in PASSED if name in wanted.parameters} | dict(self.settings)
+            try:
+                wanted.bind(*[None] * (not self.plugin.iterates), **given)
+            except TypeError as error:
+                raise InputError(f"method '{self.name}': {error}.") from error
+        else:
+            find_method(self.name, **self.settings)
+        self.backends(2, 3)
+
+    def backends(self, *dims: int) -> str:
+        """Names and versions of the backends in any of these dimensions, "native" without; InputError if none works."""
+        return _backends(self.name, json.dumps(dict(self.settings)), dims)
+
+
+@lru_cache(maxsize=1000)
+def _backends(name: str, settings: str, dims: tuple[int, ...]) -> str:
+    given = json.loads(settings)
+    names = [value for value in given.values() if isinstance(value, str) and value in QP | CONIC]
+    if name in METHODS:
+        found: list[str] = []
+        errors: list[InputError] = []
+        for dim in dims:
+            try:
+                found += find_method(name, **given).backends(dim)
+            except InputError as error:
+                errors.append(error)
+        if not found:
+            raise errors[0]
+        names = [backend for backend in found if backend != NATIVE]
+    versions = {backend: (QP | CONIC)[backend].version for backend in sorted(set(names))}
+    return ", ".join(f"{backend} {version}" for backend, version in versions.items()) or NATIVE
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run; `key` tells it apart from all others, in any campaign, until a backend's version changes."""
+
+    problem: ProblemSpec
+    method: MethodSpec
+    setting: str
+    tolerance: float
+    start: str
+    repeat: int
+
+    @cached_property
+    def key(self) -> str:
+        parts = (
+            self.problem.label,
+            self.method.label,
+            self.method.backends(2, 3),
+            self.setting,
+            self.start,
+            self.repeat,
+        )
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:20]

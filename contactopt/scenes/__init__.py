@@ -1,0 +1,73 @@
+"""The named scenes, in N, mm and MPa: the paper's three (section 6), and those with exact solutions.
+
+The paper gives E = 5 MPa, nu = .3, mu = .5 and 100 N but no sizes; ours are the defaults of the functions below, and
+only there. A load path is a tuple of scenes that differ in their loads alone; contactopt.follow() solves it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from contactopt.errors import InputError
+from contactopt.scene import Scene
+from contactopt.scenes.flat import flat_punch, rigid_punch
+from contactopt.scenes.round import cylinder, growing_indentation, indentation, sphere
+from contactopt.scenes.sliding import cattaneo, shear_cycle
+
+__all__ = [
+    "PATHS",
+    "SCENES",
+    "cattaneo",
+    "cylinder",
+    "flat_punch",
+    "growing_indentation",
+    "indentation",
+    "make_path",
+    "make_scene",
+    "rigid_punch",
+    "shear_cycle",
+    "sphere",
+]
+
+# name -> (function making the scene from keyword arguments, what it is)
+SCENES: dict[str, tuple[Callable[..., Scene], str]] = {
+    "punch-2d": (lambda **changes: flat_punch(2, **changes), "flat punch on a foundation, plane strain, half model"),
+    "punch-3d": (lambda **changes: flat_punch(3, **changes), "square flat punch on a foundation, quarter model"),
+    "sphere": (sphere, "half sphere on a foundation, axisymmetric, contact-zone loop"),
+    "cylinder-2d": (cylinder, "half cylinder on a foundation, plane strain, contact-zone loop"),
+    "rigid-punch-2d": (lambda **changes: rigid_punch("plane-strain", **changes), "rigid flat punch on a half-plane"),
+    "rigid-punch-axisymmetric": (
+        lambda **changes: rigid_punch("axisymmetric", **changes),
+        "rigid flat disc on a half-space",
+    ),
+    "hertz-dissimilar": (indentation, "rigid sphere on a half-space, axisymmetric; path: growing force"),
+    "cattaneo-2d": (lambda **changes: cattaneo(2, **changes), "two cylinders pressed and sheared; path: shear cycle"),
+    "cattaneo-3d": (lambda **changes: cattaneo(3, **changes), "two spheres pressed and sheared; path: shear cycle"),
+}
+# the scenes whose answer depends on how the load is applied: name -> function making the states in their order
+PATHS: dict[str, Callable[..., tuple[Scene, ...]]] = {
+    "hertz-dissimilar": growing_indentation,
+    "cattaneo-2d": lambda **changes: shear_cycle(2, **changes),
+    "cattaneo-3d": lambda **changes: shear_cycle(3, **changes),
+}
+
+
+def make_scene(name: str, **changes: object) -> Scene:
+    """The named scene with some of its arguments changed; InputError for an unknown name or argument."""
+    if name not in SCENES:
+        raise InputError(f"unknown scene {name!r}; choose from {', '.join(SCENES)}.")
+    return _made(name, SCENES[name][0], changes)
+
+
+def make_path(name: str, **changes: object) -> tuple[Scene, ...]:
+    """The load path of a named scene, its arguments and those of its states changed; InputError if it has none."""
+    if name not in PATHS:
+        raise InputError(f"scene {name!r} has no load path; choose from {', '.join(PATHS)}.")
+    return _made(name, PATHS[name], changes)
+
+
+def _made(name: str, make: Callable, changes: dict[str, object]):  # type: ignore[no-untyped-def]
+    try:
+        return make(**changes)
+    except TypeError as error:
+        raise InputError(f"scene '{name}': {error}.") from error

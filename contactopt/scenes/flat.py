@@ -1,0 +1,167 @@
+"""Flat punches: the paper's block on a foundation, and a rigid punch on a half-space."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactopt.analytic import (
+    Reference,
+    contact_modulus,
+    dundurs,
+    flat_punch_axisymmetric_friction,
+    flat_punch_line,
+    flat_punch_line_friction,
+)
+from contactopt.errors import InputError
+from contactopt.scene import Material, Part, Plate, Rigid, Scene, Support, check_number
+from contactopt.scenes.common import GROWTH, RUBBER, UNITS, check_positive
+
+EDGE = 1e-3  # first element at the edge of the rigid punch, over its half-width
+GENTLE = 1.1  # ratio of its neighbouring elements: at 1.2 the stick zone is three times as far off
+LARGE = {"plane-strain": 4000.0, "axisymmetric": 1000.0}  # half-space: size of the foundation over the half-width
+
+
+def flat_punch(
+    dim: int = 2,
+    *,
+    width: float = 40.0,
+    height: float = 40.0,
+    foundation_width: float = 160.0,
+    foundation_height: float = 80.0,
+    depth: float = 40.0,
+    upper: Material = RUBBER,
+    lower: Material = RUBBER,
+    mu: float = 0.5,
+    force: float = 100.0,
+    elements: int = 16,
+    rigid: str | None = None,
+    bilateral: bool = False,
+) -> Scene:
+    """A block pressed on a foundation by a rigid plate glued to its top; the foundation is clamped below.
+
+    dim        2: plane strain, half model, `depth` thick.  3: square block on a square foundation, quarter model
+    rigid      None, 'punch' or 'foundation': that body is rigid
+    sizes in mm, force in N on the whole block; elements across the contact half-width
+    """
+    if dim not in (2, 3):
+        raise InputError(f"dim must be 2 or 3; got {dim!r}.")
+    if rigid not in (None, "punch", "foundation"):
+        raise InputError(f"rigid must be None, 'punch' or 'foundation'; got {rigid!r}.")
+    check_positive(
+        width=width, height=height, foundation_width=foundation_width, foundation_height=foundation_height, depth=depth
+    )
+    check_number("force", force, low=0.0)
+    if foundation_width < width:
+        raise InputError(
+            f"the foundation ({foundation_width:g} wide) must be at least as wide as the punch ({width:g})."
+        )
+    a, up, growth = width / 2, "xyz"[dim - 1], GROWTH[dim]
+
+    def punch_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
+        from contactopt.mesh import contact_grid, graded, rename, tensor_mesh
+
+        rise = graded(height, a / elements, growth)
+        across = contact_grid(a, elements, a, growth)
+        mesh = tensor_mesh(*[across] * (dim - 1), rise)
+        return rename(mesh, contact=f"{up}-", top=f"{up}+", **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
+
+    def foundation_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
+        from contactopt.mesh import contact_grid, graded, patch, rename, tensor_mesh
+
+        depth_grid = -graded(foundation_height, a / elements, growth)[::-1]
+        across = contact_grid(a, elements, foundation_width / 2, growth)
+        mesh = tensor_mesh(*[across] * (dim - 1), depth_grid)
+        mesh = rename(mesh, top=f"{up}+", bottom=f"{up}-", **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
+        return patch(mesh, "top", "contact", [a] * (dim - 1))
+
+    symmetry = tuple(Support(f"symmetry {c}", {c: 0.0}) for c in "xy"[: dim - 1])
+    load = {up: -force}
+    top: Part | Rigid = Rigid("punch", force=load)
+    if rigid != "punch":
+        top = Part("punch", punch_mesh, upper, symmetry, (Plate("top", load),))
+    bottom: Part | Rigid = Rigid("foundation")
+    if rigid != "foundation":
+        bottom = Part("foundation", foundation_mesh, lower, (*symmetry, Support("bottom")))
+    return Scene(
+        f"punch-{dim}d",
+        top,
+        bottom,
+        mu,
+        kind="plane-strain" if dim == 2 else "solid",
+        thickness=depth if dim == 2 else 1.0,
+        copies=2 ** (dim - 1),
+        bilateral=bilateral,
+        elements=elements,
+        units=UNITS,
+        reference=flat_punch_line(force / depth, a) if dim == 2 and rigid == "punch" else None,
+    )
+
+
+def rigid_punch(
+    kind: str = "plane-strain",
+    *,
+    half_width: float = 20.0,
+    foundation: float | None = None,
+    depth: float = 40.0,
+    lower: Material = RUBBER,
+    mu: float = 0.3,
+    force: float = 100.0,
+    elements: int = 128,
+    bilateral: bool = False,
+) -> Scene:
+    """A rigid flat punch, strip or disc, pressed on a half-space: Spence's problem where friction acts.
+
+    Under monotone load the solution is self-similar, so one static step from the unloaded state is exact. The
+    half-space is a block clamped below, `foundation` high and wide from the axis: 4,000 half-widths in plane strain,
+    where its size stretches the contact by a strain ~ half_width / foundation, 1,000 radii of a disc (approach .2 % too
+    small). Elements shrink to 1e-3 of the half-width towards the punch's edge, where the tractions are singular.
+    sizes in mm, force in N; elements across the half-width; depth of the strip
+    """
+    if kind not in LARGE:
+        raise InputError(f"kind must be one of {', '.join(LARGE)}; got {kind!r}.")
+    size = LARGE[kind] * half_width if foundation is None else foundation
+    check_positive(half_width=half_width, foundation=size, depth=depth, force=force)
+    if size < 2 * half_width:
+        raise InputError(f"the foundation ({size:g}) must be at least two half-widths ({2 * half_width:g}) large.")
+    across, up = ("x", "y") if kind == "plane-strain" else ("r", "z")
+
+    def mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
+        from contactopt.mesh import graded, patch, rename, tensor_mesh
+
+        growth, first = GENTLE, EDGE * half_width
+        contact = _towards_edge(half_width, elements, first, growth)
+        beyond = half_width + graded(size - half_width, first, growth)[1:]
+        block = tensor_mesh(np.concatenate([contact, beyond]), -graded(size, first, growth)[::-1])
+        block = rename(block, axis="x-", bottom="y-", top="y+")
+        return patch(block, "top", "contact", [half_width])
+
+    plane = kind == "plane-strain"
+    return Scene(
+        "rigid-punch-2d" if plane else "rigid-punch-axisymmetric",
+        Rigid("punch", force={up: -force}),
+        Part("foundation", mesh, lower, (Support("axis", {across: 0.0}), Support("bottom"))),
+        mu,
+        kind=kind,
+        thickness=depth if plane else 1.0,
+        copies=2 if plane else 1,
+        bilateral=bilateral,
+        elements=elements,
+        units=UNITS,
+        reference=None if bilateral else _exact(kind, force, half_width, depth, lower, mu),
+    )
+
+
+def _exact(kind: str, force: float, half_width: float, depth: float, lower: Material, mu: float) -> Reference:
+    beta = dundurs(None, lower)[1]
+    if kind == "plane-strain":
+        return flat_punch_line_friction(force / depth, half_width, mu, beta)
+    return flat_punch_axisymmetric_friction(force, half_width, contact_modulus(lower), mu, beta)
+
+
+def _towards_edge(half_width: float, elements: int, first: float, growth: float) -> np.ndarray:
+    """Grid from 0 to half_width: even spacing half_width / elements at most, falling to `first` at the edge."""
+    h = half_width / elements
+    steps = first * growth ** np.arange(max(0.0, np.floor(np.log(h / first) / np.log(growth)) + 1))
+    inner = half_width - steps.sum()
+    even = np.linspace(0.0, inner, int(np.ceil(inner / h)) + 1)
+    return np.concatenate([even, half_width - np.cumsum(steps)[::-1][1:], [half_width]])

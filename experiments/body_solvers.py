@@ -1,0 +1,224 @@
+"""What do the solvers of a body's linear system cost as the mesh is refined? `--large`: up to a million unknowns."""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import multiprocessing
+import os
+import resource
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from contactopt import scenes
+from contactopt.body import build_body
+from contactopt.linear import RTOL, make_solver
+from contactopt.multigrid import nodal_blocks, rigid_motions
+from experiments.report import write
+
+PLAIN = "pyamg's defaults"
+ELEMENTS = {  # across the contact half-width
+    "superlu": (8, 12, 16, 24, 32),
+    "pardiso": (8, 12, 16, 24, 32),
+    "multigrid": (8, 12, 16, 24, 32),
+    PLAIN: (8, 12, 16, 24, 32),
+}
+LARGE = {"pardiso": (48,), "multigrid": (48, 64, 80)}
+BOTH, BOTH_LARGE = 24, 90
+COLOURS = {"superlu": "#0072B2", "pardiso": "#009E73", "multigrid": "#D55E00", PLAIN: "#999999"}
+GIB = 2**30
+
+
+def system(part: str, elements: int) -> tuple[Any, ...]:
+    """The arguments of a solver for one body of the 3D punch, and a random load on its contact unknowns."""
+    scene = scenes.flat_punch(3)
+    body = build_body(scene, getattr(scene, part), elements, None)
+    dofs, free = np.asarray(body.basis.nodal_dofs), body.free
+    node, component = np.empty(len(body.load), int), np.empty(len(body.load), int)
+    node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
+    load = np.random.default_rng(0).standard_normal(len(free)) * np.isin(free, body.contact_dofs)
+    return (body.A[free][:, free], node[free], component[free], body.basis.mesh.p), load
+
+
+class Plain:
+    """Smoothed aggregation of the same blocks and rigid motions as pyamg does it by default."""
+
+    def __init__(self, A: Any, node: np.ndarray, component: np.ndarray, points: np.ndarray):
+        import pyamg
+
+        blocks, self.place, present = nodal_blocks(A, node, component, len(points))
+        modes = rigid_motions(points[:, present])
+        modes[np.setdiff1d(np.arange(len(modes)), self.place)] = 0.0
+        self.hierarchy = pyamg.smoothed_aggregation_solver(blocks, modes)
+        self.complexity = self.hierarchy.operator_complexity()
+
+    def solve(self, load: np.ndarray) -> np.ndarray:
+        full = np.zeros(self.hierarchy.levels[0].A.shape[0])
+        full[self.place] = load
+        residuals: list[float] = []
+        x = self.hierarchy.solve(full, tol=RTOL, accel="cg", maxiter=300, residuals=residuals)
+        self.iterations = len(residuals) - 1
+        return np.asarray(x[self.place])
+
+
+def resident() -> float:
+    """Memory of this process [byte], without what it has freed (glibc)."""
+    ctypes.CDLL(None).malloc_trim(0)
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def timed(act: Callable[[], Any]) -> tuple[Any, float]:
+    """What `act` returns and the processor time it took [s]."""
+    start = time.process_time()
+    result = act()
+    return result, time.process_time() - start
+
+
+def measure(task: tuple[str, int]) -> dict[str, Any]:
+    """One solver on the foundation, in a process of its own."""
+    name, elements = task
+    arguments, load = system("lower", elements)
+    before = resident()
+    solver, setup = timed(lambda: Plain(*arguments) if name == PLAIN else make_solver(name, *arguments))
+    memory = resident() - before
+    solver.solve(load)
+    x, seconds = timed(lambda: solver.solve(load))
+    cycle = getattr(solver, "cycle", solver)
+    return {
+        "solver": name,
+        "elements": elements,
+        "unknowns": len(load),
+        "setup [s]": setup,
+        "solve [s]": seconds,
+        "iterations": solver.iterations,
+        "memory [MiB]": memory / 2**20,
+        "complexity": getattr(cycle, "complexity", ""),
+        "residual": float(np.linalg.norm(load - arguments[0] @ x) / np.linalg.norm(load)),
+    }
+
+
+def schedule() -> np.ndarray:
+    """Seconds this thread has run, and has waited for a core."""
+    run, wait = Path(f"/proc/self/task/{threading.get_native_id()}/schedstat").read_text().split()[:2]
+    return np.array([int(run), int(wait)]) / 1e9
+
+
+def watched(act: Callable[[], Any]) -> tuple[Any, np.ndarray]:
+    """What `act` returns; seconds it ran, waited for a core, waited for anything else (Python's lock)."""
+    start, before = time.perf_counter(), schedule()
+    result = act()
+    run, core = schedule() - before
+    return result, np.array([run, core, time.perf_counter() - start - run - core])
+
+
+def both(elements: int) -> list[dict[str, Any]]:
+    """Both bodies at the same time, a thread each."""
+    systems = [system(part, elements) for part in ("upper", "lower")]
+    before = resident()
+    rows = []
+    with ThreadPoolExecutor(2) as pool:
+        made = list(pool.map(lambda s: watched(lambda: make_solver("multigrid", *s[0])), systems))
+        solvers = [solver for solver, _ in made]
+        solved = list(pool.map(lambda p: watched(lambda: p[0].solve(p[1][1])), zip(solvers, systems)))
+    memory, peak = resident() - before, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    for phase, results in (("setup", made), ("solve", solved)):
+        for part, (_, load), (_, seconds), solver in zip(("punch", "foundation"), systems, results, solvers):
+            rows.append(
+                {
+                    "phase": phase,
+                    "body": part,
+                    "unknowns": len(load),
+                    "iterations": solver.iterations if phase == "solve" else "",
+                    "ran [s]": seconds[0],
+                    "waited for the other thread [s]": max(seconds[2], 0.0),
+                    "solvers [GiB]": memory / GIB,
+                    "peak with assembly [GiB]": peak / GIB,
+                }
+            )
+    return rows
+
+
+def alone(act: Callable[[Any], Any], task: Any) -> Any:
+    """act(task) in a new process, so that its memory is its own."""
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        return pool.apply(act, (task,))
+
+
+def exponents(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Slopes of log(quantity) over log(unknowns), by least squares over the three largest sizes."""
+    out = []
+    for name in ELEMENTS:
+        own = [row for row in rows if row["solver"] == name][-3:]
+        slope = {
+            key: float(np.polyfit(np.log([r["unknowns"] for r in own]), np.log([r[key] for r in own]), 1)[0])
+            for key in ("setup [s]", "solve [s]", "memory [MiB]")
+        }
+        out.append({"solver": name, **slope})
+    return out
+
+
+def draw(rows: list[dict[str, Any]]) -> Figure:
+    figure = Figure(figsize=(10, 3.4), layout="constrained")
+    for ax, key in zip(figure.subplots(1, 4), ("setup [s]", "solve [s]", "memory [MiB]", "iterations")):
+        for name, colour in COLOURS.items():
+            own = [row for row in rows if row["solver"] == name and row[key]]
+            if own:
+                ax.plot([r["unknowns"] for r in own], [r[key] for r in own], "o-", ms=3, color=colour, label=name)
+        ax.set(xscale="log", xlabel="unknowns of the body [-]", title=key if "[" in key else f"{key} [-]")
+        if key == "iterations":
+            ax.set(ylim=(0, None))
+        else:
+            ax.set(yscale="log")
+        ax.grid(alpha=0.3)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False)
+    return figure
+
+
+TEXT = """The foundation of `punch-3d`: hexahedra graded away from the contact by 1.3, held on three sides. One load, random on the
+contact unknowns. Multigrid and pyamg's defaults ({versions}) go on to a relative accuracy of 1e-10: (r' B r)^1/2 with the
+V-cycle B, or |r|. Processor seconds of one thread; memory that the solver keeps, the matrix not counted; complexity:
+entries of all levels over those of the matrix; residual |b - A x| / |b|.
+{large}
+{{rows}}
+
+Growth: exponents of the number of unknowns, fitted to the three largest sizes of each solver.
+
+{{growth}}
+
+"pyamg's defaults" has the same blocks and rigid motions and takes every neighbour for a strong one; flat elements make its
+iterations grow with the mesh. `multigrid` aggregates only nodes close in the measure of the mesh around them.
+
+Both bodies by multigrid at the same time, one thread each. The products with sparse matrices leave Python's lock to the
+other thread; pyamg's aggregation and smoothing of the prolongation, in the setup, do not. Waiting for a core is not counted.
+
+{{threads}}
+"""
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--large", action="store_true", help="up to a million unknowns; some ten minutes, 12 GiB")
+    large = parser.parse_args().large
+    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ[variable] = "1"  # for the processes started below
+    if find_spec("pypardiso") is None:
+        del ELEMENTS["pardiso"]
+    sizes = {name: (*base, *(LARGE.get(name, ()) if large else ())) for name, base in ELEMENTS.items()}
+    rows = []
+    for name, several in sizes.items():
+        for elements in several:
+            rows.append(alone(measure, (name, elements)))
+            print(rows[-1], flush=True)
+    threads = alone(both, BOTH_LARGE if large else BOTH)
+    versions = ", ".join(f"{name} {version(name)}" for name in ("pyamg", "pypardiso") if find_spec(name))
+    text = TEXT.format(versions=versions, large="Made with `--large`.\n" if large else "")
+    tables = {"rows": rows, "growth": exponents(rows), "threads": threads}
+    write("body_solvers", "Solvers of a body's linear system", text, tables, {"cost": draw(rows)})

@@ -1,0 +1,196 @@
+# %% [markdown]
+# # 4. Four roads to one answer
+#
+# Coulomb's problem is not the minimum of anything. So every method replaces it by something that can be solved, again
+# and again. Here four of them solve the same problem: alternating, Tresca, convex relaxation and Newton. Three arrive
+# at the same answer on different roads. One arrives at once, but somewhere else.
+#
+# Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) has the programs for one node.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from contactopt import diagnose, natural_map_residual, reduce, scenes, solve
+
+# %% [markdown]
+# ## The problem
+#
+# A block, 40 mm x 40 mm, is pressed on a foundation of the same rubber with 100 N. We model half of it. The normal $n$
+# points up, out of the foundation; $r$ is the force on the block; the tangent points outwards. Under the load both
+# surfaces stretch, but not equally: friction has work to do. With $\mu = 0.2$ about half of the nodes slip.
+
+# %%
+problem = reduce(scenes.flat_punch(2, mu=0.2, elements=32))
+answers, tol = {}, 1e-10
+for method in ("alternating", "tresca", "newton", "relaxation"):
+    answers[method] = solve(problem, method, tol=tol)
+    answer = answers[method]
+    print(f"{method:12} {answer.status!s:8} {answer.iterations:2} iterations, certificate {answer.residual:.0e}")
+
+r = answers["newton"].reactions
+slips = np.abs(r[:, 1]) > (1 - 1e-9) * 0.2 * r[:, 0]
+
+assert np.isclose(r[:, 0].sum(), 100.0)
+assert 0.4 * problem.contacts < slips.sum() < 0.6 * problem.contacts
+for method in ("alternating", "tresca"):
+    assert answers[method].solved
+    assert np.allclose(answers[method].reactions, r, atol=1e-7 * r.max())
+
+# %% [markdown]
+# Three methods, one answer, to eight digits.
+#
+# ## The roads
+#
+# | method | what it holds fixed | what it solves in each iteration |
+# |---|---|---|
+# | alternating | the friction forces, then the normal forces | two QPs (section 5.1 of the paper) |
+# | Tresca | the friction bounds $g = \mu r_n$ | one QP in all forces |
+# | Newton | which nodes are open, stick or slip | one linear system |
+#
+# The certificate against the iteration shows two kinds of road.
+
+# %%
+fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
+for method, style in (("alternating", "o-"), ("tresca", "s-"), ("newton", "D-")):
+    exact = solve(problem, method, tol=1e-13)
+    residuals = [entry["residual"] for entry in exact.history]
+    ax.semilogy(range(1, len(residuals) + 1), residuals, style, mfc="none", label=method)
+    answers[method] = exact
+ax.set(xlabel="iteration [-]", ylabel="certificate: natural-map residual [-]")
+ax.legend(frameon=False)
+
+# %% [markdown]
+# The fixed points go down a straight line: every iteration multiplies the error by the same number. Newton looks slow
+# at first: it is sorting the nodes. When the sorting is right, the equations are linear, and the next step is exact.
+#
+# Can we know the slope beforehand? Near the solution, a fixed point is a linear map: change the normal forces a little,
+# ask how the friction of the slipping nodes changes, ask how that changes the normal forces. The largest eigenvalue of
+# this *slip map* is the factor. `diagnose` computes it.
+
+# %%
+local = diagnose(problem, answers["newton"]).local
+print(f"predicted: alternating {local.alternating_rate:.4f}, tresca {local.tresca_rate:.4f}")
+for method, rate in (("alternating", local.alternating_rate), ("tresca", local.tresca_rate)):
+    residuals = np.array([entry["residual"] for entry in answers[method].history])
+    measured = (residuals[9] / residuals[5]) ** (1 / 4)
+    print(f"measured:  {method} {measured:.4f}")
+    assert np.isclose(measured, rate, rtol=0.02)
+
+assert answers["newton"].history[-1]["residual"] < 1e-8 * answers["newton"].history[-2]["residual"]
+assert local.slip == slips.sum()
+
+# %% [markdown]
+# A factor of 0.06: friction couples only weakly to the normal forces here. The factor grows with $\mu$, and at one the
+# fixed points no longer converge. [Tutorial 5](no_one_or_three_solutions.py) goes there.
+#
+# Now watch one slipping node on its way. A method's state after $j$ iterations is what `solve` returns with
+# `max_iterations=j`.
+
+# %%
+node = np.flatnonzero(slips)[-8]
+fig, ax = plt.subplots(figsize=(6, 4.4), layout="constrained")
+for method, style in (("alternating", "o-"), ("tresca", "s-"), ("newton", "D-")):
+    road = [solve(problem, method, tol=1e-13, max_iterations=j).reactions[node] for j in range(1, 8)]
+    ax.plot(*np.transpose(road), style, mfc="none", label=method)
+normal = np.array([0.97, 1.03]) * r[node, 0]
+ax.plot(normal, np.sign(r[node, 1]) * 0.2 * normal, "k--", lw=1, label=r"edge of the cone, $|r_t| = \mu\, r_n$")
+ax.plot(*r[node], "k*", ms=12, label="solution")
+ax.set(xlabel="normal force $r_n$ [N]", ylabel="friction force $r_t$ [N]")
+ax.legend(frameon=False)
+
+# %% [markdown]
+# ## The fourth road
+#
+# The *convex relaxation* minimises the energy over all cones at once, $\min \tfrac12 r'Qr + q'r$ with
+# $|r_t| \le \mu r_n$: one program, no iteration, a minimum that always exists. Its certificate of $10^{-3}$ is no
+# accident and no rounding error. It solved its own problem exactly, which is another one: *associated friction*. In
+# that law a contact that slips also opens, by $u_n = \mu |u_t|$.
+
+# %%
+relaxed = answers["relaxation"]
+u = problem.displacements(r, answers["newton"].multipliers)
+u_relaxed = problem.displacements(relaxed.reactions, relaxed.multipliers)
+
+x = problem.coordinates[0]
+fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
+for label, forces, style in (("Coulomb", r, "C0-"), ("associated", relaxed.reactions, "C1--")):
+    left.plot(x, -forces[:, 1] / problem.areas, style, label=label)
+left.set(xlabel="x [mm]", ylabel="friction on the block, inwards [MPa]")
+left.legend(frameon=False)
+right.plot(x, u[:, 0], "C0-", label="Coulomb: gap")
+right.plot(x, u_relaxed[:, 0], "C1--", label="associated: gap")
+right.plot(x, 0.2 * np.abs(u_relaxed[:, 1]), "k:", label=r"associated: $\mu\, |u_t|$")
+right.set(xlabel="x [mm]", ylabel="displacement [mm]")
+right.legend(frameon=False)
+
+assert relaxed.residual > 1e-3  # not Coulomb's problem
+assert np.allclose(u[:, 0], 0.0, atol=1e-9)  # everything touches
+assert np.allclose(u_relaxed[:, 0], 0.2 * np.abs(u_relaxed[:, 1]), atol=1e-6)  # slips, so it floats
+assert np.isclose(relaxed.reactions[:, 0].sum(), 100.0)
+
+# %% [markdown]
+# The edge of the block floats on nothing but a wrong law. For rock or sand, which dilate when they slide, that may be
+# right. For metals and rubber it is not. The relaxation is exact only where no loaded contact slips; `diagnose` tells
+# whether it is, and calls it *tight*.
+
+# %%
+print(diagnose(problem))
+
+assert diagnose(problem).relaxation == "not tight"
+assert natural_map_residual(problem, r, answers["newton"].multipliers) < 1e-12
+
+# %% [markdown]
+# Which road for whom? Newton needs the fewest steps and one dense factorisation in each; it may cycle if $Q$ is
+# singular. The fixed points reuse a good QP solver as it stands. The default, `solve(problem)`, begins with Newton and
+# falls back on the cones and a proximal loop.
+#
+# ## Exercises
+#
+# **1.** Set $\mu = 0$ and $\mu = 0.8$. How many iterations does each method need? Why so few?
+#
+# <details><summary>Solution</summary>
+#
+# Without friction the bounds are known and zero: the first QP is the answer. With much friction everything sticks. Then
+# the bounds do not matter, and Tresca needs no second look.
+#
+# ```python
+# smooth = reduce(scenes.flat_punch(2, mu=0.0, elements=16))
+# assert solve(smooth, "tresca").iterations == 1 and solve(smooth, "alternating").iterations == 1
+# rough = reduce(scenes.flat_punch(2, mu=0.8, elements=16))
+# assert solve(rough, "tresca").iterations <= 2 and solve(rough, "newton").iterations <= 2
+# assert solve(rough, "alternating").iterations > 5  # it still has to pass forces to and fro
+# assert diagnose(rough).relaxation == "tight"
+# ```
+#
+# </details>
+#
+# **2.** Repair the relaxation with the cure of tutorial 1: `acary_cadoux`. How many cone programs does it take?
+#
+# <details><summary>Solution</summary>
+#
+# ```python
+# cured = solve(problem, "acary_cadoux", tol=1e-10)
+# assert cured.solved and cured.iterations < 12
+# assert np.allclose(cured.reactions, r, atol=1e-7 * r.max())
+# ```
+#
+# </details>
+#
+# **3.** Refine the mesh from 8 to 64 elements. How do the iteration counts of Newton and Tresca grow?
+#
+# <details><summary>Solution</summary>
+#
+# Tresca's do not: its factor is a property of the bodies, not of the mesh. Newton's grow a little, since there are more
+# nodes to sort.
+#
+# ```python
+# counts = {}
+# for elements in (8, 16, 32, 64):
+#     finer = reduce(scenes.flat_punch(2, mu=0.2, elements=elements))
+#     counts[elements] = [solve(finer, method).iterations for method in ("newton", "tresca")]
+# assert abs(counts[64][1] - counts[8][1]) <= 1
+# assert counts[8][0] <= counts[64][0] <= 12
+# ```
+#
+# </details>

@@ -1,0 +1,265 @@
+# %% [markdown]
+# # 2. From two bodies to Q
+#
+# [Tutorial 1](one_contact_node.py) took the compliance $Q$ for granted. Here we build it from two elastic bodies, by
+# hand. The tool is the *Schur complement*: eliminate everything that is not on the interface. Then we look at the
+# spectrum of $Q$. It explains why iterative methods find contact problems hard, and what a preconditioner must do.
+#
+# Reading time: 10 minutes. You need to have seen a finite element stiffness matrix.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+from contactopt import Material, Part, Scene, Support, reduce, reduce_bodies
+from contactopt.mesh import graded, rename, tensor_mesh
+
+# %% [markdown]
+# ## Two springs
+#
+# Two springs in series press on each other. Their stiffnesses are $s_1$ and $s_2$. Under a common force $r$ the first
+# gives way by $r / s_1$, the second by $r / s_2$. Displacements add, so compliances add:
+#
+# $$ Q = s_1^{-1} + s_2^{-1} . $$
+#
+# Nothing else happens with two bodies. Only the springs become matrices, $Q = S_1^{-1} + S_2^{-1}$, and $r$ and $-r$
+# are the forces on the two sides of the interface. (This is the operator of the paper's equation 14.)
+#
+# ## Two blocks
+#
+# A punch, 4 wide and 4 high, stands on a foundation, 16 wide and 8 deep. Both are made of the same rubber. The punch is
+# held on top, the foundation is clamped below. The meshes are fine at the interface and coarse away from it: stresses
+# that vary fast along the surface do not reach deep. Both are 1 mm thick.
+
+
+# %%
+def two_blocks(nodes, upper=5.0, lower=5.0):
+    """Punch on a foundation, with that many contact nodes and Young's moduli in MPa; lengths in mm."""
+    h, zone = 4 / (nodes - 1), np.linspace(-2, 2, nodes)
+    punch = rename(tensor_mesh(zone, graded(4, h, 1.15)), contact="y-", top="y+")
+    outside = 2 + graded(6, 1.15 * h, 1.15)[1:]
+    across = np.concatenate([-outside[::-1], zone, outside])
+    ground = rename(tensor_mesh(across, -graded(8, h, 1.15)[::-1]), bottom="y-")
+    ground = ground.with_boundaries({"contact": lambda x: (x[1] > -1e-9) & (np.abs(x[0]) < 2)})
+    return Scene(
+        "two blocks",
+        upper=Part("punch", punch, Material(upper, nu=0.3), supports=(Support("top"),)),
+        lower=Part("ground", ground, Material(lower, nu=0.3), supports=(Support("bottom"),)),
+        mu=0.5,
+    )
+
+
+reduction = reduce_bodies(two_blocks(33))
+bodies = [reduced.body for reduced in reduction.bodies]
+
+fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
+for body, color in zip(bodies, ("C0", "C1")):
+    mesh = body.basis.mesh
+    ax.plot(*mesh.p[:, mesh.facets].transpose(0, 1, 2), color=color, lw=0.4)
+    ax.plot(*body.points, "o", color=color, ms=3, label=f"{body.name}, {len(body.free)} unknowns")
+ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+ax.legend(frameon=False, loc="lower left")
+
+assert all(len(body.nodes) == 33 for body in bodies)
+
+# %% [markdown]
+# ## Eliminate the inside
+#
+# Sort the unknowns of one body into inside ($i$) and contact ($c$). Its equilibrium is
+#
+# $$ \begin{bmatrix} A_{ii} & A_{ic} \\ A_{ci} & A_{cc} \end{bmatrix}
+#    \begin{bmatrix} U_i \\ U_c \end{bmatrix} = \begin{bmatrix} 0 \\ r \end{bmatrix} . $$
+#
+# The first row gives $U_i = -A_{ii}^{-1} A_{ic} U_c$. Put into the second row:
+#
+# $$ S\, U_c = r, \qquad S = A_{cc} - A_{ci} A_{ii}^{-1} A_{ic} . $$
+#
+# $S$ is the Schur complement. It is the stiffness that you feel when you hold the body by its contact nodes: few
+# unknowns, but every one coupled to every other.
+
+
+# %%
+def schur_complement(body):
+    """S of one body; unknowns ordered node by node, (x, y) each, from left to right."""
+    contact = body.contact_dofs[np.argsort(body.points[0])].ravel()
+    inside = np.setdiff1d(body.free, contact)
+    A = body.A.toarray()  # a real code keeps it sparse and factorises it once
+    return A[np.ix_(contact, contact)] - A[np.ix_(contact, inside)] @ np.linalg.solve(
+        A[np.ix_(inside, inside)], A[np.ix_(inside, contact)]
+    )
+
+
+S1, S2 = (schur_complement(body) for body in bodies)
+print(
+    "share of non-zeros:",
+    [f"{b.A.nnz / b.A.shape[0] ** 2:.1%} of A, {np.mean(S != 0):.0%} of S" for b, S in zip(bodies, (S1, S2))],
+)
+
+for S in (S1, S2):
+    assert np.allclose(S, S.T)
+    assert np.linalg.eigvalsh(S).min() > 0  # both bodies are held, so no motion is free
+
+# %% [markdown]
+# ## Add the compliances
+#
+# The project counts one block per contact, *normal first*. The normal $n$ points out of the lower body: here upwards,
+# $n = (0, 1)$. The tangent is $t = (1, 0)$. So each block $(x, y)$ is read backwards: $(y, x)$.
+#
+# The force on the upper body is $+r$ and on the lower $-r$; the relative displacement is upper minus lower. Two minus
+# signs cancel, and the compliances add, as for the springs.
+
+# %%
+nodes = len(S1) // 2
+normal_first = np.arange(2 * nodes).reshape(nodes, 2)[:, ::-1].ravel()
+Q = (np.linalg.inv(S1) + np.linalg.inv(S2))[np.ix_(normal_first, normal_first)]
+
+problem = reduction.problem
+assert np.allclose(Q, problem.Q, rtol=1e-8, atol=1e-12)
+assert np.all(np.diff(problem.coordinates[0]) > 0)
+
+# %% [markdown]
+# The same to eight digits as `contactopt.reduce`, which factorises each sparse matrix once, with the contact unknowns
+# last, and reads $S$ off the end of the factors. Nothing below this line knows that finite elements exist: all a solver
+# sees is $u = Q r + q$.
+#
+# ## What Q looks like
+#
+# Take the normal block $Q_{nn}$. Each column is the dent that a unit force at one node makes. It is deepest where the
+# force is, twice as deep at an edge, and falls off slowly: every node feels every other.
+
+# %%
+Q_nn = Q[::2, ::2]
+values, vectors = np.linalg.eigh(Q_nn)
+values, vectors = values[::-1], vectors[:, ::-1]  # softest first
+x = problem.coordinates[0]
+
+fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+for column in (0, 16, 24):
+    left.plot(x, Q_nn[:, column], label=f"force at x = {x[column]:g} mm")
+left.set(xlabel="x [mm]", ylabel="normal displacement [mm/N]")
+left.legend(frameon=False)
+for j in (0, 1, 2, 5):
+    right.plot(x, vectors[:, j] * np.sign(vectors[-1, j]), label=f"eigenvector {j}")
+right.set(xlabel="x [mm]", ylabel="eigenvector, unit length [-]", ylim=(-0.4, 0.52))
+right.legend(frameon=False, ncols=2)
+
+assert np.array_equal(np.argmax(Q_nn, axis=0), np.arange(nodes))
+assert Q_nn[0, 0] > 1.8 * Q_nn[16, 16]
+
+# %% [markdown]
+# The eigenvectors are waves. Number $j$ changes its sign exactly $j$ times, like $\cos(j \pi x / L)$. The longest wave
+# is the softest.
+
+# %%
+changes = [np.sum(np.diff(np.sign(v)) != 0) for v in vectors.T]
+assert changes == list(range(nodes))
+
+# %% [markdown]
+# ## The law behind it
+#
+# Press a wave $p \cos(\xi x)$ on an elastic half-plane. The surface sinks by the same wave, times
+# $2 (1-\nu^2) / (E\,|\xi|)$: short waves are stiff, because they only strain a thin layer. Two bodies add up to
+#
+# $$ \frac{2}{E^*} \frac{1}{|\xi|}, \qquad \frac1{E^*} = \frac{1-\nu_1^2}{E_1} + \frac{1-\nu_2^2}{E_2} . $$
+#
+# So $Q$ smooths, about as much as one integration does: it divides the wave with wave number $\xi$ by $|\xi|$.
+# Displacements have one derivative more than forces; in the language of Sobolev spaces, $Q$ maps $H^{-1/2}$ to
+# $H^{1/2}$.
+#
+# Our bodies are finite, and yet: wave number $j$ has $\xi_j = j \pi / L$, and nodal forces are pressure times the
+# spacing $h$. Prediction: the eigenvalues are $2 / (E^* h\, \xi_j)$.
+
+# %%
+modulus = 1 / (2 * (1 - 0.3**2) / 5.0)  # E*, MPa
+
+
+def predicted(count):
+    return 2 / (modulus * (4 / (count - 1)) * np.arange(1, count) * np.pi / 4)
+
+
+fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
+for count, marker in ((17, "s"), (33, "o"), (65, "^")):
+    eigenvalues = np.linalg.eigvalsh(reduce(two_blocks(count)).Q[::2, ::2])[::-1]
+    ax.loglog(np.arange(1, count), eigenvalues[1:] * 4 / (count - 1), marker, ms=4, mfc="none", label=f"{count} nodes")
+    assert np.all(np.abs(eigenvalues[2 : count // 4] / predicted(count)[1 : count // 4 - 1] - 1) < 0.25)
+ax.loglog(np.arange(1, 65), predicted(65) * 4 / 64, "k--", lw=1, label=r"half-planes, $2 / (E^* \xi_j)$")
+ax.set(xlabel="number j of the wave [-]", ylabel=r"eigenvalue of $Q_{nn}$ times h [mm$^2$/N]")
+ax.legend(frameon=False)
+
+# %% [markdown]
+# A straight line of slope $-1$, on every mesh; it bends only where the waves get too short for the mesh. Each
+# refinement adds shorter waves at the stiff end and changes nothing at the soft end. So the condition number (largest
+# over smallest eigenvalue) is proportional to the number of nodes:
+
+# %%
+conditions = []
+for count in (17, 33, 65):
+    fine = reduce(two_blocks(count)).Q
+    conditions.append([np.linalg.cond(fine[::2, ::2]), np.linalg.cond(fine)])
+    print(f"{count} nodes: condition {conditions[-1][0]:.1f} of the normal block, {conditions[-1][1]:.0f} of all Q")
+growth = np.array(conditions)[1:] / np.array(conditions)[:-1]
+
+assert np.all((growth > 1.9) & (growth < 2.1))
+
+# %% [markdown]
+# All of $Q$ is ten times worse than its normal block, but grows at the same rate. The reason is one more soft motion:
+# the punch can sway sideways. It is a beam, 4 high and 4 wide, held on top.
+#
+# [Tutorial 3](why_the_preconditioner_works.py) undoes the division by $|\xi|$.
+#
+# ## Exercises
+#
+# **1.** Make the foundation a million times stiffer. What should $Q$ become? Check it.
+#
+# <details><summary>Solution</summary>
+#
+# The second spring no longer gives way: what remains is the compliance of the punch alone.
+#
+# ```python
+# stiff = reduce(two_blocks(33, lower=5e6)).Q
+# alone = np.linalg.inv(S1)[np.ix_(normal_first, normal_first)]
+# assert np.linalg.norm(stiff - alone) < 1e-5 * np.linalg.norm(alone)
+# ```
+#
+# </details>
+#
+# **2.** Let a rigid plate press on the punch with a total force of 10 N instead of holding its top. Then the punch is
+# free to move up and down, and its $S$ is singular: it has no compliance for that motion. Where does `contactopt` put
+# it?
+#
+# <details><summary>Solution</summary>
+#
+# Into $u = Q r + V \lambda + q$ with the balance $V' r + s = 0$. One column of $V$ moves all nodes up by one; $\lambda$
+# is the unknown displacement of the plate; $s$ is the load. The plate is glued, so it holds the punch sideways.
+#
+# ```python
+# from dataclasses import replace
+# from contactopt import Plate, solve
+# scene = two_blocks(17)
+# pressed = replace(scene, upper=replace(scene.upper, supports=(), loads=(Plate("top", {"y": -10.0}),)))
+# with_plate = reduce(pressed)
+# V = with_plate.V.reshape(-1, 2)
+# assert np.allclose(V[:, 0], 1.0) and np.allclose(V[:, 1], 0.0)
+# assert np.allclose(with_plate.s, -10.0)
+# answer = solve(with_plate)
+# assert np.isclose(answer.reactions[:, 0].sum(), 10.0)  # the contact carries the load
+# assert answer.multipliers[0] < 0  # the plate comes down
+# ```
+#
+# </details>
+#
+# **3.** The Schur complement is dense. How many numbers does $Q$ hold for a 3D interface of 100 x 100 nodes? For which
+# operations would you rather not form it?
+#
+# <details><summary>Solution</summary>
+#
+# $(3 \cdot 10^4)^2 = 9 \cdot 10^8$ numbers, 7 GB. Products $Q r$ need no $Q$: one forward and one backward substitution
+# per body, which is what `reduction.operator` does.
+#
+# ```python
+# assert (3 * 100 * 100) ** 2 * 8 / 1e9 > 7
+# force = np.random.default_rng(0).normal(size=len(Q))
+# assert np.allclose(reduction.operator @ force, Q @ force, rtol=1e-6)
+# ```
+#
+# </details>

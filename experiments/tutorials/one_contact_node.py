@@ -1,0 +1,344 @@
+# %% [markdown]
+# # 1. One contact node by hand
+#
+# One node of an elastic body comes down on a floor. Will it touch? Will it slide? How large are the forces? This
+# tutorial answers three times, each time with another kind of mathematical program: a quadratic program (QP), a
+# second-order cone program (SOCP) and a complementarity problem. The programs are written in `cvxpy`, in five lines
+# each.
+#
+# Reading time: 10 minutes. You need linear algebra, and you should have seen a Lagrange multiplier before.
+
+# %%
+import json
+
+import cvxpy as cp
+import matplotlib.pyplot as plt
+import numpy as np
+
+from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve
+
+# %% [markdown]
+# ## The problem
+#
+# Two bodies meet: the lower one is the floor, the upper one is elastic. The unit vector $n$ points out of the *lower*
+# body, so it points up. The unit vector $t$ points along the floor.
+#
+# - $r = (r_n, r_t)$ is the force on the *upper* body, normal component first. $r_n \ge 0$ pushes it up: compression.
+# - $u = (u_n, u_t)$ is the relative displacement. $u_n \ge 0$ is the gap that remains; $u_t$ is the slip.
+#
+# The body is linear, so displacement depends on force by a small symmetric matrix:
+#
+# $$ u = Q\,r + q . $$
+#
+# $q$ is where the node would go without any contact force. $Q$ is the *compliance*: column one is the displacement
+# under a unit normal force. Its off-diagonal entry says that pressing also moves the node sideways.
+
+# %%
+Q = np.array([[1.0, 0.4], [0.4, 1.2]])  # mm / N
+q = np.array([-1.0, 0.9])  # mm: without contact the node would sink 1 mm into the floor and move 0.9 mm to the right
+mu = 0.5  # friction coefficient
+
+assert np.all(np.linalg.eigvalsh(Q) > 0)  # every force costs energy
+
+# %% [markdown]
+# ## Signorini: contact without friction is a QP
+#
+# Forget friction for a moment: $r_t = 0$. Contact says three things, called *Signorini's conditions*:
+#
+# $$ u_n \ge 0, \qquad r_n \ge 0, \qquad u_n\, r_n = 0 . $$
+#
+# No penetration, no glue, and force only where the gap is closed. These are the optimality conditions of
+#
+# $$ \min_{r_n \ge 0} \; \tfrac12 Q_{nn} r_n^2 + q_n r_n . $$
+#
+# Why? The derivative of the cost is $Q_{nn} r_n + q_n = u_n$. At the minimum it is zero if $r_n > 0$, and must not be
+# negative if $r_n = 0$. **The multiplier of the constraint is the gap.**
+
+# %%
+r_n = cp.Variable()
+push = r_n >= 0
+signorini = cp.Problem(cp.Minimize(Q[0, 0] * r_n**2 / 2 + q[0] * r_n), [push])
+signorini.solve(solver=cp.CLARABEL)
+print(f"r_n = {r_n.value:.3f} N, gap = {push.dual_value:.1e} mm")
+
+assert np.isclose(r_n.value, 1.0)  # = -q_n / Q_nn
+assert np.isclose(push.dual_value, 0.0, atol=1e-6)
+
+# %% [markdown]
+# Lift the body by 3 mm and solve again. Nothing touches, the force is zero, and the multiplier is the gap of 2 mm.
+
+# %%
+lifted = cp.Problem(cp.Minimize(Q[0, 0] * r_n**2 / 2 + (q[0] + 3.0) * r_n), [push])
+lifted.solve(solver=cp.CLARABEL)
+
+assert np.isclose(r_n.value, 0.0, atol=1e-6)
+assert np.isclose(push.dual_value, 2.0, atol=1e-5)
+
+# %% [markdown]
+# ## Coulomb's law
+#
+# Friction may hold the node back, but only so much: $|r_t| \le \mu\, r_n$. If the node moves, friction uses all it has,
+# against the motion:
+#
+# $$ u_t \ne 0 \;\Rightarrow\; r_t = -\mu\, r_n\, \frac{u_t}{|u_t|} . $$
+#
+# If the normal force were known, the bound $g = \mu r_n$ would be a number and friction would again be a QP:
+#
+# $$ \min_{|r_t| \le g} \; \tfrac12 Q_{tt} r_t^2 + (q_t + Q_{tn} r_n)\, r_t . $$
+#
+# The derivative is now the slip $u_t$. It vanishes inside the interval: *stick*. At an end it points outwards, against
+# the force: *slip*. So solve the two QPs in turn, each with the other's answer. This is the *alternating iteration*.
+
+# %%
+force = cp.Variable(2)
+bound, pull, other = cp.Parameter(nonneg=True), cp.Parameter(value=0.0), cp.Parameter()
+normal = cp.Problem(cp.Minimize(Q[0, 0] * force[0] ** 2 / 2 + (q[0] + Q[0, 1] * pull) * force[0]), [force[0] >= 0])
+friction = cp.abs(force[1]) <= bound
+tangential = cp.Problem(cp.Minimize(Q[1, 1] * force[1] ** 2 / 2 + (q[1] + Q[1, 0] * other) * force[1]), [friction])
+
+path = []
+for _ in range(14):
+    normal.solve(solver=cp.CLARABEL)
+    bound.value, other.value = mu * max(float(force.value[0]), 0.0), float(force.value[0])
+    tangential.solve(solver=cp.CLARABEL)
+    pull.value = float(force.value[1])
+    path.append([other.value, pull.value])
+path = np.array(path)
+print(np.round(path[:5], 4), "...", np.round(path[-1], 4))
+
+assert np.allclose(path[-1], [1.25, -0.625], atol=1e-5)
+
+# %% [markdown]
+# Each pair of QPs brings the answer closer, by the same factor every time: $\mu\, Q_{nt} / Q_{nn} = 0.2$. With more
+# friction or more coupling the factor passes one and the iteration fails. [Tutorial 5](no_one_or_three_solutions.py) is
+# about that.
+
+# %%
+error = np.abs(path[:6, 0] - 1.25)
+assert np.allclose(error[1:] / error[:-1], mu * Q[0, 1] / Q[0, 0], rtol=1e-2)
+
+# %% [markdown]
+# ## Both at once: an SOCP
+#
+# The admissible forces form a cone, $K = \{\,|r_t| \le \mu\, r_n\}$. In 3D the tangential force has two components, the
+# cone is round, and the constraint is a second-order cone; we write it so that it would work there too. Minimise the
+# energy over the cone:
+
+# %%
+r = cp.Variable(2)
+gap_shift = cp.Parameter(nonneg=True, value=0.0)
+cone = cp.SOC(mu * r[0], r[1:])
+energy = cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r + mu * gap_shift * r[0]
+socp = cp.Problem(cp.Minimize(energy), [cone])
+
+socp.solve(solver=cp.CLARABEL)
+u = Q @ r.value + q
+print(f"force {np.round(r.value, 3)}, slip {u[1]:.3f}, gap {u[0]:.3f} = mu |slip| = {mu * abs(u[1]):.3f}")
+
+assert np.isclose(u[0], mu * abs(u[1]), atol=1e-5)
+
+# %% [markdown]
+# Look at the gap. The node slips, presses on the floor, and floats above it by $\mu |u_t|$! The minimum over the cone
+# obeys another law, *associated friction*: what slips also opens. It is convex, so it always has an answer, but it is
+# not Coulomb's. (We left the shift at zero.)
+#
+# The cure, due to Acary and Cadoux: raise the floor by exactly what the cone adds. With $s = |u_t|$ and the cost
+# $\mu s\, r_n$ added, the optimality condition becomes $u_n + \mu s = \mu |u_t|$, hence $u_n = 0$. We do not know $s$
+# beforehand, so we repeat.
+
+# %%
+for _ in range(12):
+    socp.solve(solver=cp.CLARABEL)
+    u = Q @ r.value + q
+    gap_shift.value = abs(float(u[1]))
+print(f"force {np.round(r.value, 4)}, slip {u[1]:.4f}, gap {u[0]:.1e}")
+
+assert np.allclose(r.value, [1.25, -0.625], atol=1e-5)
+assert np.isclose(u[0], 0.0, atol=1e-5)
+
+# %% [markdown]
+# ## No iteration at all: a complementarity problem
+#
+# In 2D the friction law has finitely many cases, and all of it can be written as pairs of numbers that are not
+# negative, with at least one of each pair zero:
+#
+# | $z \ge 0$ | complementary to | says |
+# |---|---|---|
+# | $r_n$ | $u_n$ | Signorini |
+# | $x = r_t + \mu r_n$ | $u_t + y$ | to the right only if friction pulls left with all its force |
+# | $y$ | $2\mu r_n - x = \mu r_n - r_t$ | to the left, $u_t = -y$, only if it pulls right with all its force |
+#
+# "At least one of each pair is zero" is a yes-or-no question. A binary $b$ per pair asks it, with a number $M$ that is
+# larger than anything in the answer. A mixed-integer solver answers.
+
+# %%
+z, b, M = cp.Variable(3, nonneg=True), cp.Variable(3, boolean=True), 10.0
+reaction = cp.hstack([z[0], z[1] - mu * z[0]])
+w = cp.hstack([Q[0] @ reaction + q[0], Q[1] @ reaction + q[1] + z[2], 2 * mu * z[0] - z[1]])
+complementarity = cp.Problem(cp.Minimize(0), [w >= 0, z <= M * b, w <= M * (1 - b)])
+complementarity.solve(solver=cp.SCIPY)
+
+assert np.allclose(reaction.value, [1.25, -0.625], atol=1e-6)
+
+# %% [markdown]
+# Three programs, one answer. The same from `contactopt`, which also says how good it is. The *certificate* is the
+# natural-map residual: zero exactly at the solutions of Coulomb's problem, and computed from the problem alone.
+
+# %%
+problem = InterfaceProblem(Q, [q], mu)  # one row of q per contact
+solution = solve(problem)
+print(solution.status, solution.reactions[0], f"certificate {solution.residual:.0e}")
+
+assert solution.solved and np.allclose(solution.reactions, [[1.25, -0.625]])
+for answer in (path[-1], r.value, reaction.value):
+    assert natural_map_residual(problem, answer[None]) < 1e-4
+assert len(all_solutions(problem)) == 1  # the complementarity problem has no other solution
+
+# %% [markdown]
+# ## More friction, less slip
+#
+# Raise $\mu$ and watch. The slip falls to zero at $\mu = |r_t| / r_n$ of the sticking node, which is
+# $r = -Q^{-1} q = (1.5, -1.25)$. From there on friction has more than it needs, and nothing changes any more.
+
+# %%
+coefficients = np.linspace(0, 1.2, 61)
+answers = [solve(InterfaceProblem(Q, [q], value)) for value in coefficients]
+forces = np.array([answer.reactions[0] for answer in answers])
+slips = (forces @ Q + q)[:, 1]
+
+fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+left.plot(coefficients, forces[:, 0], label="normal force $r_n$")
+left.plot(coefficients, -forces[:, 1], label="friction force $-r_t$")
+left.set(xlabel=r"friction coefficient $\mu$ [-]", ylabel="force [N]", ylim=(0, 1.7))
+left.legend(frameon=False)
+right.plot(coefficients, slips, color="C2")
+right.axvline(1.25 / 1.5, color="grey", lw=1, ls="--")
+right.text(1.25 / 1.5 + 0.02, 0.9, "stick", color="grey")
+right.text(1.25 / 1.5 - 0.02, 0.9, "slip", color="grey", ha="right")
+right.set(xlabel=r"friction coefficient $\mu$ [-]", ylabel="slip $u_t$ [mm]")
+
+assert all(answer.solved for answer in answers)
+assert np.all((slips > 1e-6) == (coefficients < 1.25 / 1.5))
+
+# %% [markdown]
+# The same with a slider. Every position of it is a certified answer; the page only draws. (The cell makes a few
+# lines of HTML, so the slider also works in a saved page, without Python.)
+
+# %% tags=["hide-input"]
+PAGE = """
+<div class="one-node" style="font-family: sans-serif; max-width: 34em">
+<label>friction coefficient <b class="value"></b><br>
+<input type="range" min="0" max="LAST" value="START" style="width: 100%" aria-label="friction coefficient"></label>
+<svg viewBox="-150 -175 300 205" role="img" aria-label="friction cone and force">
+<path class="cone" fill="#0072B2" fill-opacity="0.15" stroke="#0072B2"/>
+<path d="M-145 0H145M0 25V-170" stroke="#888" stroke-width="0.7"/>
+<path class="force" stroke="#D55E00" stroke-width="3" fill="none"/><circle class="tip" r="4" fill="#D55E00"/>
+<path class="slip" stroke="#009E73" stroke-width="4" fill="none"/>
+<text x="5" y="-163" font-size="9" fill="#888">normal force</text>
+<text x="145" y="-5" font-size="9" fill="#888" text-anchor="end">friction force</text>
+<text x="5" y="22" font-size="9" fill="#009E73">slip</text></svg>
+<p class="words" style="min-height: 3em"></p></div>
+<script>
+(() => {
+  const data = DATA, scale = 85;
+  for (const box of document.querySelectorAll(".one-node:not([data-ready])")) {
+    box.dataset.ready = "yes";
+    const part = name => box.querySelector(name), slider = part("input");
+    const draw = () => {
+      const [mu, n, t, slip] = data[slider.value], x = scale * t, y = -scale * n, side = 170 * mu;
+      part(".value").textContent = mu.toFixed(2);
+      part(".cone").setAttribute("d", `M0 0L${-side} -170H${side}Z`);
+      part(".force").setAttribute("d", `M0 0L${x} ${y}`);
+      part(".tip").setAttribute("cx", x);
+      part(".tip").setAttribute("cy", y);
+      part(".slip").setAttribute("d", `M0 8H${scale * slip}`);
+      part(".words").textContent = `Force ${n.toFixed(3)} N upwards, ${(-t).toFixed(3)} N to the left: ` +
+        (slip > 1e-6 ? `on the edge of the cone, the node slips ${slip.toFixed(3)} mm.`
+                     : "inside the cone, the node sticks.");
+    };
+    slider.addEventListener("input", draw);
+    draw();
+  }
+})();
+</script>
+"""
+
+
+class Slider:
+    """Rows (mu, r_n, r_t, u_t) behind a slider; notebooks show what _repr_html_ returns."""
+
+    def __init__(self, rows, start):
+        page = PAGE.replace("DATA", json.dumps(rows)).replace("START", str(start))
+        self.html = page.replace("LAST", str(len(rows) - 1))
+
+    def _repr_html_(self):
+        return self.html
+
+
+rows = np.round(np.column_stack([coefficients, forces, slips]), 6).tolist()
+Slider(rows, start=25)
+
+# %% [markdown]
+# ## Exercises
+#
+# **1.** Press harder: $q = (-2, 0.9)$. From which $\mu$ on does the node stick? Guess first: more or less friction than
+# before?
+#
+# <details><summary>Solution</summary>
+#
+# The sticking force is $-Q^{-1}q$; the node sticks once the cone holds it. Pressing harder makes friction stronger, so
+# a smaller coefficient is enough.
+#
+# ```python
+# r_n, r_t = -np.linalg.solve(Q, [-2.0, 0.9])
+# needed = abs(r_t) / r_n
+# assert needed < 1.25 / 1.5
+# sticking = solve(InterfaceProblem(Q, [[-2.0, 0.9]], needed * 1.1))
+# assert np.allclose(sticking.reactions, [[r_n, r_t]])
+# slipping = solve(InterfaceProblem(Q, [[-2.0, 0.9]], needed * 0.9))
+# assert abs(slipping.reactions[0, 1]) < abs(r_t)
+# ```
+#
+# </details>
+#
+# **2.** Add a second tangential direction. The block of the node is now $(n, t_1, t_2)$. Which of the three programs
+# still works as it stands, which needs a change, and which cannot be written at all?
+#
+# <details><summary>Solution</summary>
+#
+# The SOCP works as it stands: `r[1:]` has two components. The tangential QP becomes a small SOCP, over a disc instead
+# of an interval. The complementarity problem counts the cases of a law with two directions; the circle has infinitely
+# many, so it needs a polygon in its place, which is another law.
+#
+# ```python
+# Q3 = np.block([[Q, np.zeros((2, 1))], [np.zeros((1, 2)), np.array([[1.2]])]])
+# q3 = np.array([-1.0, 0.9, 0.3])
+# r3, shift = cp.Variable(3), cp.Parameter(nonneg=True, value=0.0)
+# cost = cp.quad_form(r3, cp.psd_wrap(Q3)) / 2 + q3 @ r3 + mu * shift * r3[0]
+# program = cp.Problem(cp.Minimize(cost), [cp.SOC(mu * r3[0], r3[1:])])
+# for _ in range(15):
+#     program.solve(solver=cp.CLARABEL)
+#     shift.value = float(np.linalg.norm((Q3 @ r3.value + q3)[1:]))
+# in_3d = InterfaceProblem(Q3, [q3], mu)
+# assert natural_map_residual(in_3d, r3.value[None]) < 1e-4
+# assert np.allclose(r3.value, solve(in_3d).reactions, atol=1e-4)
+# ```
+#
+# </details>
+#
+# **3.** Change the sign of the coupling, $Q_{nt} = -0.4$. Does friction now make the normal force smaller or larger
+# than without friction? Explain the sign of $\mu\, Q_{nt}/Q_{nn}$.
+#
+# <details><summary>Solution</summary>
+#
+# The friction force $r_t < 0$ contributes $Q_{nt} r_t$ to the gap. With $Q_{nt} > 0$ it pulls the node into the floor,
+# which presses back harder. With $Q_{nt} < 0$ it lifts the node and the normal force falls.
+#
+# ```python
+# flipped = solve(InterfaceProblem(Q * [[1, -1], [-1, 1]], [q], mu))
+# assert flipped.reactions[0, 0] < 1.0 < solution.reactions[0, 0]
+# ```
+#
+# </details>
+#
+# Next: [where Q comes from](from_bodies_to_compliance.py).

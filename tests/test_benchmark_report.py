@@ -1,0 +1,252 @@
+"""Figures and tables against numbers worked out by hand; reports from tables alone."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import contactopt.driver
+from contactopt import InputError, benchmark
+from contactopt.benchmark import figures, tables
+from contactopt.benchmark.figures import _pareto, fitted_exponent
+from contactopt.benchmark.report import read_layout
+from contactopt.benchmark.store import COLUMNS
+from contactopt.cli import main
+from tests.test_architecture import ROOT, imports
+from tests.test_benchmark import SMALL, written
+
+CAMPAIGNS = Path(__file__).parents[1] / "experiments" / "campaigns"
+REPORTS = Path(__file__).parents[1] / "reports"
+
+
+def table(**columns) -> pd.DataFrame:
+    """Rows with the given columns; the others as in a successful run."""
+    size = max(len(v) for v in columns.values())
+    usual = {"law": "coulomb", "setting": "mid", "tolerance": 1e-6, "start": "cold", "repeat": 0, "success": True}
+    usual |= {"claimed": True, "status": "solved", "residual": 1e-7, "time_limit": 10.0, "problem": "p", "method": "m"}
+    return pd.DataFrame({name: [value] * size for name, value in usual.items()} | columns)
+
+
+def lines(figure) -> dict[str, np.ndarray]:
+    return {line.get_label(): line.get_xydata() for ax in figure.axes for line in ax.get_lines()}
+
+
+def test_performance_profile_by_hand():
+    times = {"a": [1.0, 2.0, 9.0], "b": [2.0, 1.0, 3.0]}
+    rows = table(
+        method=["a"] * 3 + ["b"] * 3,
+        problem=["x", "y", "z"] * 2,
+        solve_seconds=times["a"] + times["b"],
+        success=[True, True, False, True, True, True],
+    )
+    curves = lines(figures.performance_profile(rows))
+    a, b = curves["a (2)"], curves["b (3)"]
+    np.testing.assert_allclose(a[:-1], [[1, 0], [1, 1 / 3], [2, 2 / 3]])
+    np.testing.assert_allclose(b[:-1], [[1, 0], [1, 1 / 3], [1, 2 / 3], [2, 1]])
+
+
+def test_a_method_that_fails_once_in_its_repeats_has_failed():
+    rows = table(repeat=[0, 1, 2], solve_seconds=[1.0, 1.0, 1.0], success=[True, False, True])
+    assert "m (0)" in lines(figures.performance_profile(rows))
+
+
+def test_exponents_and_pareto_fronts():
+    n = np.array([10.0, 20, 40, 80, 160])
+    assert abs(fitted_exponent(n, 3e-6 * n**1.5) - 1.5) < 1e-12
+    assert np.isnan(fitted_exponent(n[:2], n[:2]))
+    late = np.where(n < 40, 1e-2, 1e-5 * n**2)  # a constant cost that hides the power at small sizes
+    assert abs(fitted_exponent(n, late) - 2) < 1e-12
+    points = np.array([[1, 5], [2, 3], [3, 4], [4, 1], [1, 6]])
+    np.testing.assert_array_equal(_pareto(points), [[1, 5], [2, 3], [4, 1]])
+
+
+def test_time_table_counts_failures_at_the_time_limit():
+    rows = table(
+        method=["a", "a", "b", "b"], solve_seconds=[0.001, 0.003, 0.001, 5.0], success=[True, True, True, False]
+    )
+    out = tables.time_table(rows).set_index("method")
+    a = np.sqrt(0.002 * 0.004) - 0.001
+    b = np.sqrt(0.002 * 10.001) - 0.001
+    np.testing.assert_allclose(out.loc["a", "shifted mean"], a)
+    np.testing.assert_allclose(out.loc["b", "shifted mean"], b)
+    np.testing.assert_allclose(out.loc["b", "over the least"], b / a)
+    assert out.loc["b", "solved"] == "1 of 2" and out.loc["b", "median"] == 0.001
+
+
+def test_success_table_tells_right_claims_from_successes():
+    rows = table(
+        setting=["mid", "high", "mid", "high"],
+        tolerance=[1e-6, 1e-9, 1e-6, 1e-9],
+        success=[True, False, True, False],
+        claimed=[True, True, True, False],
+        status=["solved", "false_claim", "solved", "killed"],
+    )
+    row = tables.success_table(rows).iloc[0]
+    assert row["mid [%]"] == 100 and row["high [%]"] == 0 and row["right claim [%]"] == 75
+    assert row["failures"] == "1 false_claim, 1 killed"
+    assert list(tables.success_table(rows).columns[2:4]) == ["mid [%]", "high [%]"]
+
+
+def test_speed_accuracy_marks_what_missed_its_tolerance():
+    rows = table(
+        setting=["low", "mid", "high"],
+        tolerance=[1e-3, 1e-6, 1e-9],
+        solve_seconds=[1.0, 2.0, 3.0],
+        residual=[1e-4, 1e-7, 1e-8],
+        success=[True, True, False],
+    )
+    drawn = figures.speed_accuracy(rows).axes[0].get_lines()
+    filled = next(line for line in drawn if line.get_label() == "m")
+    hollow = next(line for line in drawn if line.get_markerfacecolor() == "white")
+    np.testing.assert_allclose(filled.get_xydata(), [[1.0, 1e-4], [2.0, 1e-7]])
+    np.testing.assert_allclose(hollow.get_xydata(), [[3.0, 1e-8]])
+
+
+def test_stability_map_and_its_thresholds():
+    mu, ratio = np.meshgrid([0.1, 1.0, 10.0], [1.0, 100.0])
+    rows = table(**{"problem.mu": mu.ravel(), "problem.stiffness_ratio": ratio.ravel()})
+    rows["success"] = rows["problem.mu"] < 5
+    rows["guaranteed_mu"], rows["alternating_mu"] = np.where(rows["problem.stiffness_ratio"] == 1, 1.0, 0.1), np.inf
+    rows["iterations"] = 7.0
+    figure = figures.stability_map(rows)
+    np.testing.assert_array_equal(figure.axes[0].get_images()[0].get_array(), [[1, 1, 0], [1, 1, 0]])
+    (line,) = figure.axes[0].get_lines()
+    np.testing.assert_allclose(line.get_xydata(), [[1, 0], [0, 1]])  # mu = 1 in the first row, .1 in the second
+    shown = figures.stability_map(rows, value="iterations").axes[0].get_images()[0].get_array()
+    assert np.ma.getmaskarray(np.ma.masked_invalid(shown))[:, 2].all() and shown[0, 0] == 7
+
+
+def test_convergence_draws_the_history():
+    history = json.dumps([[1e-1, 1e-3], [0.1, 0.2], [1, 2]])
+    rows = table(history=[history])
+    np.testing.assert_allclose(lines(figures.convergence(rows))["m"], [[1, 1e-1], [2, 1e-3]])
+    np.testing.assert_allclose(lines(figures.convergence(rows, x="seconds"))["m"], [[0.1, 1e-1], [0.2, 1e-3]])
+
+
+def test_profiles_compare_within_one_law():
+    rows = table(law=["coulomb", "associated"], method=["a", "b"], solve_seconds=[1.0, 2.0])
+    assert set(tables.select(rows)["method"]) == {"a"}
+    assert set(tables.select(rows, law="associated")["method"]) == {"b"}
+    with pytest.raises(InputError, match="no column"):
+        tables.select(rows, colour="red")
+    with pytest.raises(InputError, match="no row"):
+        tables.select(rows, method="c")
+
+
+def test_figures_and_tables_cannot_solve():
+    for name in ("figures", "tables"):
+        inner = {i for i in imports(ROOT / "benchmark" / f"{name}.py") if i.startswith("contactopt.")}
+        assert all(i.startswith(("contactopt.benchmark.tables", "contactopt.errors")) for i in inner)
+
+
+EXPERIMENT = (
+    SMALL.replace("repeats = 2", 'repeats = 2\nfindings = "mine.py"\ntitle = "A small one"\ntext = "What it is."')
+    + """
+[quick]
+repeats = 1
+[[figures]]
+kind = "performance_profile"
+caption = "A profile of `all`."
+[[figures]]
+kind = "convergence"
+caption = "Histories."
+where = {family = "rigid_bodies"}
+[[figures]]
+kind = "success_table"
+caption = "Who won."
+"""
+)
+
+
+@pytest.fixture(scope="module")
+def reported(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "campaigns").mkdir()
+    written(folder / "campaigns", "def findings(table):\n    return [f'{len(table)} runs were made.']\n", "mine.py")
+    written(folder / "campaigns", EXPERIMENT, "small.toml")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        arguments = ["--experiments", "campaigns", "--jobs", "2"]
+        assert main(["report", *arguments]) == 2  # there is no table yet
+        assert main(["report", "--run", "quick", *arguments]) == 0
+        assert not (folder / "reports").exists()
+        assert main(["report", "small", "--run", "full", *arguments]) == 0
+    return folder
+
+
+def test_a_report_is_rebuilt_without_solving(reported, monkeypatch):
+    monkeypatch.chdir(reported)
+    text = Path("reports/small/report.md").read_text()
+    for made in (
+        *Path("reports/small").glob("figure-*"),
+        Path("reports/small/report.md"),
+        Path("reports/benchmarks.html"),
+    ):
+        made.unlink()
+
+    def forbidden(*arguments, **settings):
+        raise AssertionError("a report must not solve")
+
+    monkeypatch.setattr(contactopt.driver, "solve", forbidden)
+    assert main(["report", "--experiments", "campaigns"]) == 0
+    again = Path("reports/small/report.md").read_text()
+    assert again == text and "1. 12 runs were made." in text and "What it is." in text
+    for name in re.findall(r"!\[.*?\]\((.*?)\)", text):
+        assert Path("reports/small", name).stat().st_size > 1000
+    assert text.count("*Figure ") == 2 and text.count("*Table ") == 1 and "contactopt report --run full small" in text
+    quick = Path("out/quick/reports/small/report.md").read_text()
+    assert "1. 6 runs were made." in quick
+    csv = benchmark.load("reports/small/rows.csv")
+    assert {"versions", "machine", "backend", "history"} <= set(csv) <= set(COLUMNS) | {f for f in csv if "." in f}
+
+
+def test_the_page_stands_alone(reported):
+    page = (reported / "reports" / "benchmarks.html").read_text()
+    sources = re.findall(r'src="([^"]*)"', page)
+    assert len(sources) == 2 and all(source.startswith("data:image/png;base64,") for source in sources)
+    assert all(link.startswith(("#", "http")) for link in re.findall(r'href="([^"]*)"', page))
+    assert "<table>" in page and "A small one" in page
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('kind = "convergence"', 'kind = "pie"', "figure 2: unknown kind 'pie'"),
+        ('caption = "Histories."', "", "figure 2: it needs a caption"),
+        ('where = {family = "rigid_bodies"}', 'where = {family = "none"}', "figure 2 (convergence): no row"),
+        ('where = {family = "rigid_bodies"}', "colour = 1", "figure 2 (convergence)"),
+        ('findings = "mine.py"', 'findings = "yours.py"', "yours.py"),
+    ],
+)
+def test_errors_of_a_report_name_the_figure(reported, monkeypatch, capsys, old, new, words):
+    monkeypatch.chdir(reported)
+    Path("wrong").mkdir(exist_ok=True)
+    shutil.copy("campaigns/mine.py", "wrong")
+    written(Path("wrong"), EXPERIMENT.replace(old, new), "small.toml")
+    assert main(["report", "--experiments", "wrong"]) == 2
+    error = capsys.readouterr().err
+    assert words in error and "small.toml" in error
+
+
+@pytest.mark.parametrize("path", sorted(CAMPAIGNS.glob("*.toml")), ids=lambda p: p.stem)
+def test_committed_reports_follow_from_their_tables(path, tmp_path):
+    """Every experiment can be read in both versions, and its report says what its table says."""
+    for quick in (False, True):
+        assert benchmark.read_experiment(path, quick=quick).runs()
+    name = read_layout(path).name
+    folder = REPORTS / name
+    if not (folder / "rows.csv").exists():
+        pytest.skip("not run yet")
+    (tmp_path / name).mkdir()
+    shutil.copy(folder / "rows.csv", tmp_path / name)
+    benchmark.report.build([path], tmp_path)
+
+    def kept(report: Path) -> str:
+        return "\n".join(line for line in report.read_text().splitlines() if not line.startswith("Experiment:"))
+
+    assert kept(tmp_path / name / "report.md") == kept(folder / "report.md")
+    assert all(file.stat().st_size < 1_000_000 for file in folder.iterdir())

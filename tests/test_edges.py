@@ -1,0 +1,68 @@
+import numpy as np
+import pytest
+
+from contactopt import InterfaceProblem, Part, Rigid, Scene
+from contactopt.edges import contact_edge, stick_edge
+from contactopt.scene import Material
+
+PART = Part("body", None, Material(1.0, 0.3))
+
+
+def contact(x: np.ndarray, kind: str, areas: np.ndarray) -> tuple[Scene, InterfaceProblem]:
+    dim = 3 if kind == "solid" else 2
+    problem = InterfaceProblem(
+        np.eye(dim * x.shape[1]), np.zeros((x.shape[1], dim)), np.full(x.shape[1], 0.5), areas=areas, coordinates=x
+    )
+    return Scene("s", PART, Rigid("floor"), 0.5, kind=kind), problem
+
+
+def cattaneo(distance: np.ndarray, a: float, c: float) -> tuple[np.ndarray, np.ndarray]:
+    p = np.sqrt(np.maximum(0.0, 1 - (distance / a) ** 2))
+    return p, 0.5 * (p - c / a * np.sqrt(np.maximum(0.0, 1 - (distance / c) ** 2)))
+
+
+@pytest.mark.parametrize("c", [0.613, 0.3, 0.95])
+def test_edges_of_exact_tractions_in_a_line(c):
+    x = np.linspace(-1.25, 1.25, 101)
+    scene, problem = contact(x[None], "plane-strain", np.full(101, 0.025))
+    p, q = cattaneo(np.abs(x), 0.987, c)
+    r = 0.025 * np.stack([p, -q], axis=1)
+    assert contact_edge(scene, problem, r) == pytest.approx(0.987, rel=1e-9)
+    assert stick_edge(scene, problem, r) == pytest.approx(c, rel=1e-9)
+
+
+def test_edges_of_exact_tractions_on_a_surface():
+    grid = np.linspace(-1.25, 1.25, 31)
+    x = np.stack(np.meshgrid(grid, grid)).reshape(2, -1)
+    scene, problem = contact(x, "solid", np.full(961, (2.5 / 30) ** 2))
+    p, q = cattaneo(np.linalg.norm(x, axis=0), 0.987, 0.613)
+    r = (2.5 / 30) ** 2 * np.stack([p, -0.6 * q, 0.8 * q], axis=1)
+    assert contact_edge(scene, problem, r) == pytest.approx(0.987, rel=1e-9)
+    assert stick_edge(scene, problem, r) == pytest.approx(0.613, rel=1e-9)
+
+
+def test_stick_edge_after_a_reversal():
+    x = np.linspace(-1.25, 1.25, 201)
+    scene, problem = contact(x[None], "plane-strain", np.full(201, 0.0125))
+    p, q = cattaneo(np.abs(x), 0.987, 0.4)
+    q = q - 2 * cattaneo(np.abs(x), 0.987, 0.7)[1]
+    r = 0.0125 * np.stack([p, -q], axis=1)
+    assert stick_edge(scene, problem, r) == pytest.approx(0.7, rel=1e-9)
+
+
+def test_a_zone_elsewhere_is_read_by_its_area():
+    x = np.linspace(-1.25, 1.25, 101)
+    scene, problem = contact(x[None], "plane-strain", np.full(101, 0.025))
+    p = np.sqrt(np.maximum(0.0, 1 - ((x - 0.5) / 0.5) ** 2))
+    r = 0.025 * np.stack([p, 0 * p], axis=1)
+    assert contact_edge(scene, problem, r) == pytest.approx(0.5, abs=0.03)
+    assert stick_edge(scene, problem, r) == contact_edge(scene, problem, r)
+
+
+def test_all_or_nothing_sticks():
+    x = np.linspace(0.0, 1.0, 11)
+    scene, problem = contact(x[None], "plane-strain", np.full(11, 0.2))
+    full = np.stack([np.ones(11), np.full(11, 0.1)], axis=1)
+    assert stick_edge(scene, problem, full) == pytest.approx(1.1)  # areas of the nodes: 2.2, half of it
+    slipping = np.stack([np.ones(11), np.full(11, 0.5)], axis=1)
+    assert stick_edge(scene, problem, slipping) == 0.0

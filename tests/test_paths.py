@@ -1,0 +1,227 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import MATERIAL, block, two_blocks
+
+from contactopt import (
+    InputError,
+    Material,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    natural_map_residual,
+    reduce,
+    run,
+    scenes,
+    solve,
+)  # fmt: skip
+from contactopt.paths import follow
+
+
+def dragged(shift: float, force: float = 3.0, mu: float = 0.4) -> Scene:
+    """A block pressed on a rigid floor by a plate, its top dragged sideways by a support."""
+    mesh = block("plane-strain", 0, 1)
+    part = Part(
+        "block", mesh, MATERIAL, (Support("top", {"x": shift}),), (Plate("top", {"y": -force}, glued=False),), "bottom"
+    )
+    return Scene("dragged", part, Rigid("floor"), mu)
+
+
+def sheared(**changes: object) -> tuple[Scene, ...]:
+    return scenes.shear_cycle(2, **{"steps": 3, "elements": 10, "shear": 30.0, **changes})
+
+
+@pytest.fixture(scope="module")
+def cycle():
+    return follow(sheared())
+
+
+def test_a_path_of_one_state_is_the_static_problem():
+    scene = scenes.flat_punch(2, elements=6)
+    path = follow([scene])
+    alone = solve(reduce(scene))
+    np.testing.assert_allclose(path.solution.reactions, alone.reactions, atol=1e-8 * np.abs(alone.reactions).max())
+    assert path.solved and len(path.states) == 1
+
+
+def test_every_step_is_certified_by_its_own_problem(cycle):
+    for step, state in enumerate(cycle.states):
+        solution = state.solution
+        assert natural_map_residual(cycle.problem(step), solution.reactions, solution.multipliers) <= 1e-8
+    assert cycle.reduction.problem.fingerprint == cycle.problem(-1).fingerprint
+
+
+def test_slip_that_never_turns_back_needs_no_path(cycle):
+    last = cycle.states[3].solution.reactions  # the first time at the largest shear
+    once = solve(reduce(cycle.states[3].scene)).reactions
+    # up to the slip of the normal load alone, which bodies of finite size are not quite without
+    np.testing.assert_allclose(last, once, atol=1e-3 * np.abs(once).max())
+
+
+def test_unloading_needs_the_path(cycle):
+    back = cycle.states[6]
+    assert abs(cycle.history["shear_force"][6]) < 1e-6
+    assert np.abs(back.solution.reactions[:, 1]).sum() > 5.0  # locked in; a single step from zero has none
+    once = solve(reduce(back.scene)).reactions
+    assert np.abs(once[:, 1]).sum() < 0.2
+
+
+def test_a_cycle_closes_and_is_antisymmetric(cycle):
+    h = cycle.history
+    shares = np.array([3, 2, 1, 0, -1, -2, -3, -2, -1, 0, 1, 2, 3]) / 3
+    np.testing.assert_allclose(h["shear_force"][3:], 30 * shares, atol=1e-6)
+    assert h["shift"][15] == pytest.approx(h["shift"][3], rel=1e-3)
+    assert h["shift"][9] == pytest.approx(-h["shift"][3], rel=2e-3)
+    np.testing.assert_allclose(h["shift"][9:16], -h["shift"][3:10], atol=2e-3 * h["shift"].max())
+
+
+def test_friction_work_is_the_area_of_the_loop():
+    h = follow(sheared(steps=12, shear=45.0)).history
+    force, shift, work = h["shear_force"][12:], h["shift"][12:], h["friction_work"][12:]
+    area = np.sum((force[1:] + force[:-1]) / 2 * np.diff(shift))
+    assert work[-1] - work[0] == pytest.approx(area, rel=0.02)
+    assert np.all(np.diff(h["friction_work"]) >= 0)
+
+
+def loads(kind: str):
+    """Two states of the blocks under other loads than a plate force alone."""
+    base = two_blocks(kind, mu=0.02)
+    pull = (0.3, -0.2) if kind != "solid" else (0.3, 0.1, -0.2)
+    for share in (0.4, 1.0, 0.7):
+        upper = replace(base.upper, loads=(*base.upper.loads, Traction("side0", tuple(share * t for t in pull))))
+        upper = replace(upper, supports=upper.supports[1:] if kind == "solid" else ())
+        lower = replace(base.lower, supports=(Support("bottom", dict.fromkeys(base.components, 0.01 * share)),))
+        yield replace(base, upper=upper, lower=lower)
+
+
+@pytest.mark.parametrize("kind", ["plane-strain", "axisymmetric", "solid"])
+def test_energy_balance_of_general_loads(kind):
+    states = list(loads(kind))
+    if kind != "axisymmetric":  # held against sliding away and turning by the glued plate
+        states = [
+            replace(s, upper=replace(s.upper, loads=(replace(s.upper.loads[0], glued=True), s.upper.loads[1])))
+            for s in states
+        ]
+    path = follow(states, tol=1e-10)
+    h = path.history
+    assert path.solved and h["friction_work"][-1] > 0
+    np.testing.assert_allclose(h["energy_error"], 0.0, atol=1e-9)
+    spent = h["elastic_energy"] + h["friction_work"] + h["step_work"]
+    np.testing.assert_allclose(h["external_work"], spent, rtol=1e-8)
+
+
+def test_energy_balance_from_the_interface_alone(cycle):
+    """s' dlambda - r' dq = d(r' Q r / 2) + D with mean forces: the interface's share of the same balance."""
+    problem = cycle.reduction.problem
+    for old, new in zip(cycle.states[:-1], cycle.states[1:]):
+        r0, r1 = (state.solution.reactions.ravel() for state in (old, new))
+        moved = new.solution.multipliers - old.solution.multipliers
+        elastic = (r1 @ problem.Q @ r1 - r0 @ problem.Q @ r0) / 2
+        assert (old.s + new.s) @ moved / 2 == pytest.approx(elastic + new.contact, abs=1e-9)
+
+
+def test_gross_sliding_saturates_at_the_friction_bound():
+    shifts = [0.0, 2.0, 4.0, 6.0, 4.0, 2.0, 0.0, 2.0, 4.0, 6.0]
+    path = follow([dragged(d) for d in shifts])
+    h = path.history
+    assert path.solved
+    assert h["shear_force"][3] == pytest.approx(1.2, rel=1e-9) and h["shear_force"][6] == pytest.approx(-1.2, rel=1e-9)
+    assert h["friction_work"][3] - h["friction_work"][2] == pytest.approx(1.2 * 2.0, rel=1e-8)  # mu N times the way
+    assert h["stick_nodes"][3] == 0 and h["slip_nodes"][3] == h["contact_nodes"][3] > 2
+    np.testing.assert_allclose(h["energy_error"], 0.0, atol=1e-9)
+    np.testing.assert_allclose(h["shift"], shifts, atol=1e-12)
+
+
+def test_a_mirrored_load_gives_the_mirrored_history():
+    right, left = (follow([dragged(s * d) for d in (0.1, 0.3, 0.2)], tol=1e-12).history for s in (1, -1))
+    # the block's mesh is not symmetric, so that only the whole scene's mirror image would agree exactly
+    assert np.sign(left["shear_force"]).tolist() == (-np.sign(right["shear_force"])).tolist()
+    flipped = follow([_mirror(dragged(-d)) for d in (0.1, 0.3, 0.2)], tol=1e-12).history
+    np.testing.assert_allclose(flipped["shear_force"], -right["shear_force"], rtol=1e-8)
+    np.testing.assert_allclose(flipped["friction_work"], right["friction_work"], rtol=1e-8, atol=1e-12)
+
+
+def _mirror(scene: Scene) -> Scene:
+    mesh = scene.upper.mesh
+    p = mesh.p.copy()
+    p[0] *= -1
+    turned = replace(mesh, doflocs=p, t=mesh.t[[0, 3, 2, 1]], _boundaries=None)
+    return replace(scene, upper=replace(scene.upper, mesh=turned.with_boundaries(
+        {"top": lambda x: x[1] == 1, "bottom": lambda x: x[1] == 0})))  # fmt: skip
+
+
+def test_units_do_not_matter():
+    small = follow(sheared(elements=6)).history
+    stiff = follow(sheared(elements=6, material=Material(5e6, 0.3), force=1e8, shear=3e7)).history
+    assert stiff["friction_work"] == pytest.approx(1e6 * small["friction_work"], rel=1e-6)
+    assert stiff["stick_half_width"] == pytest.approx(small["stick_half_width"], rel=1e-6)
+
+
+def test_growing_contact_of_dissimilar_bodies():
+    states = scenes.growing_indentation(mu=0.3, elements=48, steps=24)
+    h, exact = follow(states).history, states[-1].reference
+    assert h["contact_half_width"][-1] == pytest.approx(exact.half_width, rel=0.01)
+    assert h["approach"][-1] == pytest.approx(exact.approach, rel=0.01)
+    ratio = exact.stick_half_width / exact.half_width
+    path = h["stick_half_width"][-1] / h["contact_half_width"][-1]
+    once = follow(states[-1:]).history
+    assert path == pytest.approx(ratio, abs=0.05)
+    assert once["stick_half_width"][-1] / once["contact_half_width"][-1] < ratio - 0.3  # one big step is wrong
+    np.testing.assert_allclose(h["energy_error"], 0.0, atol=1e-9)
+
+
+def test_a_step_that_is_not_solved_ends_the_path():
+    path = follow(sheared(), method="tresca", max_iterations=1)
+    assert not path.solved and len(path.states) == 1 and path.states[0].solution.iterations == 1
+
+
+def test_bad_paths_are_refused():
+    with pytest.raises(InputError, match="no states"):
+        follow([])
+    held = replace(dragged(0.1).upper, supports=(Support("top"),), loads=())
+    with pytest.raises(InputError):
+        follow([dragged(0.1), replace(dragged(0.1), upper=held)])
+
+
+def test_files_of_a_path(cycle, tmp_path):
+    cycle.write(tmp_path / "new")
+    assert {p.name for p in (tmp_path / "new").iterdir()} == {"history.csv", "path.npz"}
+    table = np.genfromtxt(tmp_path / "new" / "history.csv", delimiter=",", names=True)
+    for name, column in cycle.history.items():
+        np.testing.assert_allclose(table[name], column)
+    data = np.load(tmp_path / "new" / "path.npz")
+    assert data["reactions"].shape == data["displacements"].shape == (16, cycle.reduction.problem.contacts, 2)
+
+
+def test_run_follows_the_path_of_a_named_scene(tmp_path):
+    result = run("cattaneo-2d", tmp_path, steps=2, elements=8, shear=20.0)
+    assert {"history.csv", "path.npz", "path.png", "summary.json"} <= {p.name for p in tmp_path.iterdir()}
+    assert result.summary["states"] == len(result.path.states) == 11
+    assert result.summary["shear_force"] == pytest.approx(20.0)
+    assert result.summary["friction_work"] == result.path.history["friction_work"][-1] > 0
+    assert run("punch-2d", elements=4).path is None
+
+
+def test_animation(tmp_path):
+    from PIL import Image
+
+    from contactopt.animation import animate, loop
+
+    cycle = follow(sheared(elements=8)[:4])
+    animate(cycle, tmp_path / "film.gif")
+    assert [p.name for p in tmp_path.iterdir()] == ["film.gif"]
+    assert (tmp_path / "film.gif").stat().st_size < 1e6
+    assert Image.open(tmp_path / "film.gif").n_frames == len(cycle.states)
+    assert loop(cycle).get_xlabel() == "shift [mm]"
+    growing = follow(scenes.growing_indentation(elements=8, steps=2))
+    assert loop(growing).get_xlabel() == "approach [mm]"
+
+
+def test_energy_balance_with_quadratic_displacement():
+    path = follow([replace(dragged(d), degree=2) for d in (0.0, 1.0, 0.5)])
+    assert path.solved
+    np.testing.assert_allclose(path.history["energy_error"], 0.0, atol=1e-9)

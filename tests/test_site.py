@@ -1,0 +1,129 @@
+"""The documentation is built from scratch, warnings as errors, tutorials executed; its pages are whole."""
+
+import re
+import subprocess
+import sys
+import time
+from html import unescape
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+import contactopt
+from contactopt.methods import METHODS
+
+ROOT = Path(__file__).parents[1]
+SITE = ROOT / "experiments" / "site"
+LIMIT = 600.0  # s: three minutes on two idle cores, more where other tests run
+
+
+@pytest.fixture(scope="module")
+def titles() -> dict[str, str]:
+    """Name and title of the reports that are there before the build."""
+    reports = (ROOT / "reports").glob("*/report.md")
+    return {report.parent.name: report.read_text().splitlines()[0].removeprefix("# ") for report in reports}
+
+
+@pytest.fixture(scope="module")
+def built(titles, tmp_path_factory) -> Path:
+    """Site of a build in a process of its own; the folder of the sources is left as it was, but for `generated`."""
+    out = tmp_path_factory.mktemp("site")
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-W",
+        "--keep-going",
+        "-q",
+        "-E",
+        "-d",
+        out / "doctrees",
+        SITE,
+        out / "html",
+    ]
+    start = time.perf_counter()
+    done = subprocess.run([str(c) for c in command], cwd=ROOT, capture_output=True, text=True, timeout=LIMIT)
+    assert done.returncode == 0, "install the extra `docs`, or mend:\n" + done.stderr[-4000:]
+    print(f"built in {time.perf_counter() - start:.0f} s")
+    return out / "html"
+
+
+def pages(site: Path) -> dict[Path, str]:
+    return {path: path.read_text() for path in site.rglob("*.html")}
+
+
+def letters(html: str) -> str:
+    """What remains of a page without mark-up, quotes and spaces."""
+    return re.sub(r"\W", "", unescape(re.sub("<.*?>", "", html)))
+
+
+@pytest.mark.slow
+def test_every_method_and_public_name_has_its_place(built):
+    listed = (built / "generated" / "methods.html").read_text()
+    for name, (_, _, what) in METHODS.items():
+        page = (built / "generated" / "methods" / f"{name}.html").read_text()
+        assert f"{name}.html" in listed and letters(what[1:]) in letters(page)
+    reference = (built / "generated" / "api.html").read_text()
+    everything = {anchor for text in pages(built).values() for anchor in re.findall(r'id="(contactopt[\w.]*)"', text)}
+    for name in contactopt.__all__:
+        assert f">{name}<" in reference
+        thing = getattr(contactopt, name)
+        if not hasattr(thing, "__path__") and hasattr(thing, "__qualname__"):
+            assert any(anchor.endswith(f".{name}") for anchor in everything), f"{name} is on no page"
+
+
+@pytest.mark.slow
+def test_tutorials_were_executed_and_their_slider_is_there(built):
+    for path in (ROOT / "experiments" / "tutorials").glob("*.py"):
+        page = (built / "generated" / "tutorials" / f"{path.stem}.html").read_text()
+        assert "<img" in page, f"{path.stem}: no figure"
+        assert page.count("<details>") == path.read_text().count("<details>") > 0
+    assert 'class="one-node"' in (built / "generated" / "tutorials" / "one_contact_node.html").read_text()
+
+
+@pytest.mark.slow
+def test_reports_are_included(built, titles):
+    text = "".join((built / "generated" / f"{page}.html").read_text() for page in ("accuracy", "performance"))
+    assert len(titles) > 5
+    for name, title in titles.items():
+        assert letters(title) in letters(text), title
+        assert (built / "generated" / "reports" / f"{name}.html").read_text().count("<table") > 0, name
+
+
+@pytest.mark.slow
+def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(built):
+    for path, text in pages(built).items():
+        for tag, target in re.findall(r'<(\w+)[^>]*?\s(?:href|src)="([^"#][^"]*)"', text):
+            parts = urlsplit(unescape(target))
+            if parts.scheme or parts.netloc:
+                assert tag == "a", f"{path.name} loads {target}"
+            elif parts.path:
+                assert (path.parent / unquote(parts.path)).exists(), f"{path.name} links to {target}"
+    assert (built / "_static" / "mathjax" / "tex-chtml.js").exists()
+
+
+def test_what_is_written_by_hand_belongs_to_a_method():
+    for path in (SITE / "notes").glob("*.md"):
+        assert path.stem in METHODS
+        for head in ("**Program.**", "**Cost:**", "**Converges**", "**Fails**"):
+            assert path.read_text().count(head) == 1, f"{path.name}: {head}"
+
+
+def test_docstrings_become_harmless_restructured_text(monkeypatch):
+    monkeypatch.syspath_prepend(str(SITE))
+    from generate import as_rst
+
+    lines = [
+        "Bound |r_t| <= mu * r_n_ of `solve`:",
+        "r    (k,) force",
+        "     more",
+        "Prose.",
+        "1. one",
+        "   and on",
+        "2. two",
+    ]
+    text = "\n".join(as_rst(list(lines)))
+    assert r"Bound \|r_t\| <= mu \* r_n\_ of ``solve``:" in text
+    assert ".. code-block:: text\n\n    r    (k,) force\n         more\n\nProse." in text
+    assert r"1\. one and on" in text and "\n\n" + r"2\. two" in text
