@@ -24,15 +24,14 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from contactopt.driver import solve
-from contactopt.elements import is_curved
 from contactopt.errors import InputError
 from contactopt.paths import PathResult, follow
 from contactopt.problem import Solution
 from contactopt.quantities import QUANTITIES, at_rim
 from contactopt.reduction import Reduction, reduce_bodies
+from contactopt.refinement import split_scene
 from contactopt.scene import Part, Scene, check_number
 from contactopt.warm import transfer
 from contactopt.zone import AGREE, LOOPS, contact_half_width, pressed
@@ -119,7 +118,7 @@ def refine(
     if quantity not in QUANTITIES:
         raise InputError(f"unknown quantity {quantity!r}; choose from {', '.join(QUANTITIES)}.")
     check_number("the accuracy", accuracy, low=0.0, high=1.0)
-    search = _Search(tuple(states), quantity, note, {"Q": Q, "solver": solver} | settings)
+    search = _Search(tuple(states), quantity, note, {"Q": Q, "solver": solver}, settings)
     while True:
         mesh, order, grading = *search.mesh_error(), search.grading_error()
         size = max(abs(mesh + grading), abs(mesh) / 2, abs(grading) / 2)
@@ -132,8 +131,10 @@ def refine(
         if message:
             break
     last = search.final()
-    message = message or ("" if last.solution.solved else search.unsolved(last))
+    message = message or ("" if last.solution.solved else unsolved(last))
     value, scale = last.level.value, abs(search.value) or 1.0
+    coarse = sum(level.seconds for level in search.levels) - last.level.seconds
+    last = replace(last, solution=replace(last.solution, seconds=last.solution.seconds | {"coarse": coarse}))
     estimate = Estimate(
         quantity,
         accuracy,
@@ -167,6 +168,10 @@ def remainder(before: float | None, last: float, best: float) -> tuple[float, fl
     return float(np.copysign(size, last)), order
 
 
+def unsolved(solved: Solved) -> str:
+    return f"the mesh of {solved.level.unknowns} unknowns was not solved: {solved.solution.message}"
+
+
 class _Search:
     """The nested solves and what they say. The last of `meshes`, with `splits`, is the mesh in question.
 
@@ -174,10 +179,12 @@ class _Search:
     changes  of the value by the first split, the second, ...: those of the present splits, and at least one
     """
 
-    def __init__(self, states: tuple[Scene, ...], quantity: str, note: Note, options: dict[str, Any]):
-        self.states, self.quantity, self.note, self.options = states, quantity, note, options
+    def __init__(
+        self, states: tuple[Scene, ...], quantity: str, note: Note, forms: dict[str, str], settings: dict[str, Any]
+    ):
+        self.states, self.quantity, self.note, self.forms, self.settings = states, quantity, note, forms, settings
         scene = states[-1]
-        self.given = not all(callable(part.mesh) for part in _parts(scene))
+        self.given = not all(callable(part.mesh) for part in (scene.upper, scene.lower) if isinstance(part, Part))
         self.first = scene.elements if self.given else max(COARSEST[scene.dim], scene.elements // BELOW)
         self.best = 2 * scene.degree
         self.levels: list[Level] = []
@@ -213,7 +220,7 @@ class _Search:
         """Why it would be in vain to go on, or nothing."""
         assert self.last is not None
         if not self.last.solution.solved:
-            return self.unsolved(self.last)
+            return unsolved(self.last)
         if self.quantity == "pressure" and at_rim(self.last.reduction, self.last.solution):
             return "the largest pressure is at the edge of the contact surface, a corner, where no mesh bounds it"
         steps = np.diff([level.value for level in self.meshes])
@@ -221,9 +228,6 @@ class _Search:
         if len(steps) > 2 and np.all(steps[-2:] > 2**-STUCK * np.abs(steps[-3:-1])):
             return f"the {self.quantity} does not converge: every refinement changes it by as much as the one before"
         return ""
-
-    def unsolved(self, solved: Solved) -> str:
-        return f"the mesh of {solved.level.unknowns} unknowns was not solved: {solved.solution.message}"
 
     def finer_mesh(self) -> str:
         """Refine the last mesh; or the reason not to."""
@@ -252,8 +256,13 @@ class _Search:
         return self._solve(*wanted)
 
     def _too_large(self, growth: float, splits: int) -> str:
+        """By how many unknowns the next mesh passes the limit, if it does; the share of the splits is taken from a coarser mesh."""
         dim = self.states[-1].dim
-        unknowns = growth * self.meshes[-1].unknowns * 2 ** (dim * splits)
+        counts = {(level.elements, level.splits): level.unknowns for level in self.levels}
+        pairs = [
+            n / counts[elements, 0] for (elements, s), n in counts.items() if s == splits and (elements, 0) in counts
+        ]
+        unknowns = growth * self.meshes[-1].unknowns * (max(pairs) if pairs else 2 ** (dim * splits))
         if unknowns <= LARGEST[dim]:
             return ""
         return f"to go on would take up to {unknowns:.2g} unknowns, more than {LARGEST[dim]:,}"
@@ -277,9 +286,9 @@ class _Search:
         self.note(f"{elements} elements across the half-width" + (f", {splits} splits" if splits else ""))
         begin = time.perf_counter()
         base = elements if self.given else elements // 2**splits
-        states = [_split_scene(scene, base, splits) for scene in self.states]
+        states = [split_scene(scene, base, splits) for scene in self.states]
         if len(states) > 1:
-            path = follow(states, elements, **self.options)
+            path = follow(states, elements, **self.forms, **self.settings)
             reduction, solution, zones = path.reduction, path.solution, list[float]()
         else:
             path = None
@@ -298,9 +307,9 @@ class _Search:
         zones = list(known) or ([] if scene.zone is None else [scene.zone])
         source = None if before is None else (before.reduction.problem, before.solution)
         while True:
-            reduction = reduce_bodies(scene, elements, zones[-1] if zones else None, **self._forms)
+            reduction = reduce_bodies(scene, elements, zones[-1] if zones else None, **self.forms)
             start = None if source is None else transfer(*source, reduction.problem)
-            solution = solve(reduction.problem, start=start, **self._settings)
+            solution = solve(reduction.problem, start=start, **self.settings)
             source = reduction.problem, solution
             seconds.update(reduction.seconds)
             seconds.update(solution.seconds)
@@ -313,52 +322,3 @@ class _Search:
             agreed = abs(zones[-1] - zones[-2]) <= AGREE * zones[-2] / elements
             if agreed or not solution.solved or len(zones) > LOOPS:
                 return reduction, solution, zones
-
-    @property
-    def _forms(self) -> dict[str, Any]:
-        return {key: self.options[key] for key in ("Q", "solver")}
-
-    @property
-    def _settings(self) -> dict[str, Any]:
-        return {key: value for key, value in self.options.items() if key not in ("Q", "solver")}
-
-
-def _parts(scene: Scene) -> list[Part]:
-    return [part for part in (scene.upper, scene.lower) if isinstance(part, Part)]
-
-
-def _split_scene(scene: Scene, elements: int, splits: int) -> Scene:
-    """The scene on the meshes for `elements`, halved `splits` times."""
-
-    def finer(part: Any) -> Any:
-        if not isinstance(part, Part):
-            return part
-
-        def mesh(_: int, zone: float | None) -> Any:
-            made = part.build_mesh(elements, zone)
-            for _ in range(splits):
-                made = split(made, part.contact)
-            return made
-
-        return replace(part, mesh=mesh)
-
-    return replace(scene, upper=finer(scene.upper), lower=finer(scene.lower)) if splits else scene
-
-
-def split(mesh: Any, contact: str) -> Any:
-    """The mesh with all elements halved; in the plane, new nodes of a curved contact boundary lie on a cubic spline.
-
-    The spline gives the height over the coordinate along which the boundary extends most, so that partners on
-    two bodies stay partners. Raises InputError for meshes with curved elements.
-    """
-    if is_curved(mesh):
-        raise InputError("meshes with curved elements cannot be refined here; give a mesh function of `elements`.")
-    fine = mesh.refined(1)
-    if len(mesh.p) > 2:
-        return fine
-    old, new = (np.unique(m.facets[:, m.boundaries[contact]]) for m in (mesh, fine))
-    along = int(np.argmax(np.ptp(mesh.p[:, old], axis=1)))
-    order = old[np.argsort(mesh.p[along, old])]
-    p = fine.p.copy()
-    p[1 - along, new] = CubicSpline(mesh.p[along, order], mesh.p[1 - along, order])(p[along, new])
-    return replace(fine, doflocs=p)

@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from contactopt.backends import CONIC, QP
 from contactopt.errors import InputError
@@ -13,6 +14,7 @@ from contactopt.linear import SOLVERS
 from contactopt.methods import METHODS, NATIVE
 from contactopt.operators import FORMS
 from contactopt.preconditioners import PRECONDITIONERS
+from contactopt.quantities import QUANTITIES
 from contactopt.scenes import PATHS, SCENES
 
 
@@ -46,6 +48,10 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--mu", type=float, metavar="X", help="friction coefficient")
     run.add_argument("--force", type=float, metavar="N", help="total normal force")
     run.add_argument("--elements", type=int, metavar="N", help="elements across the contact half-width")
+    run.add_argument(
+        "--accuracy", type=float, metavar="X", help="refine until the quantity's relative error is below X"
+    )
+    run.add_argument("--quantity", metavar="NAME", help="what --accuracy bounds: " + ", ".join(QUANTITIES))
     run.add_argument("--tol", type=float, default=1e-8, metavar="T", help="bound on the natural-map residual (1e-8)")
     bench = commands.add_parser("bench", help="execute the runs of an experiment file")
     bench.set_defaults(command=_bench)
@@ -87,6 +93,8 @@ def _run(options: argparse.Namespace) -> int:
         solver=options.solver,
         tol=options.tol,
         elements=options.elements,
+        accuracy=options.accuracy,
+        quantity=options.quantity,
         note=lambda text: print(f"  {text}", file=sys.stderr, flush=True),
         **changes,
     )
@@ -101,12 +109,26 @@ def _run(options: argparse.Namespace) -> int:
     approach = "none (no plate)" if s["approach"] is None else f"{s['approach']:.6g} mm"
     print(f"normal force {s['normal_force']:.6g} N, approach {approach}, largest pressure {s['max_pressure']:.6g} MPa")
     print(f"contact half-width {s['contact_half_width']:.6g} mm, stick half-width {s['stick_half_width']:.6g} mm")
+    if result.estimate is not None:
+        _print_estimate(result.estimate)
     print(
         f"{s['seconds']['total']:.1f} s: " + ", ".join(f"{k} {v:.2f}" for k, v in s["seconds"].items() if k != "total")
     )
     extra = "" if result.path is None else " path.png, history.csv, path.npz,"
     print(f"files in {out}: summary.json, deformed.png, pressure.png,{extra} interface.npz, *.vtu")
-    return 0 if result.solution.solved else 1
+    return 0 if result.solution.solved and (result.estimate is None or result.estimate.reached) else 1
+
+
+def _print_estimate(estimate: Any) -> None:
+    print(
+        f"{estimate.quantity} {estimate.value:.6g}, estimated relative error {estimate.error:.1e}, "
+        f"asked for {estimate.target:g}: {estimate.message}"
+    )
+    for level in estimate.levels:
+        print(
+            f"  {level.elements} elements, {level.splits} splits: {level.unknowns} unknowns, "
+            f"{level.value:.6g}, {level.seconds:.2f} s"
+        )
 
 
 def _bench(options: argparse.Namespace) -> int:

@@ -144,7 +144,7 @@ def _unsymmetric_step(
     rough = _rough_inverse(P, closed, D, np.repeat(equations.rho, d)[closed], V[closed])
     inverse = rough
     if P.model is not None:
-        model = LinearOperator((n + p, n + p), matvec=system(lambda x: P.model @ x), dtype=float)  # type: ignore[operator]
+        model = LinearOperator((n + p, n + p), matvec=system(lambda x: P.model @ x), dtype=float)
         inverse = LinearOperator(
             (n + p, n + p), matvec=lambda x: _gmres(model, x.ravel(), INNER * rtol, rough)[0], dtype=float
         )

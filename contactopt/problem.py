@@ -204,8 +204,9 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     if isinstance(problem.Q, InterfaceOperator):
         Q = problem.Q.scaled(1 / compliance, rigid.astype(float))
     else:
-        Q = problem.Q / compliance
-        Q[rigid, rigid] = 1.0
+        entries = np.array(problem.Q / compliance)
+        entries[rigid, rigid] = 1.0
+        Q = entries
     scaled = replace(
         problem,
         Q=Q,

@@ -7,15 +7,16 @@ values at an edge or a peak come from fits through many nodes, weighted by the n
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contactopt.edges import contact_edge, stick_edge
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.reduction import Reduction
 from contactopt.scene import Scene
-from contactopt.zone import pressed
+
+if TYPE_CHECKING:
+    from contactopt.reduction import Reduction
 
 WINDOW = 0.5  # of the distance from the largest pressure to the edge: where p^2 is fitted
 
@@ -48,6 +49,8 @@ def peak_pressure(reduction: Reduction, solution: Solution) -> float:
     axisymmetric mesh the nodal value is some 1 % low, since the strain u_r / r is poorly resolved there, on a ring
     whose area counts for nothing. Where the window has no room, the nodal value.
     """
+    from contactopt.zone import pressed
+
     problem = reduction.problem
     x, node = _surface(reduction.scene, problem)
     pressure = solution.reactions[:, 0] / problem.areas
@@ -107,6 +110,9 @@ def width(reduction: Reduction, solution: Solution) -> float:
     In the plane, where contact ends by itself: the zero of a line through p^2 against x^2, from half of the half-width to the last
     node but one, whose values carry the error of the edge. Otherwise contact_edge().
     """
+    from contactopt.edges import contact_edge
+    from contactopt.zone import pressed
+
     problem, r = reduction.problem, solution.reactions
     inside, distance = pressed(r), np.abs(problem.coordinates[0])
     if problem.dim == 2 and inside.any() and not inside.all() and distance[~inside].min() > distance[inside].max():
@@ -121,6 +127,8 @@ def width(reduction: Reduction, solution: Solution) -> float:
 
 
 def _stick_ratio(reduction: Reduction, solution: Solution) -> float:
+    from contactopt.edges import contact_edge, stick_edge
+
     given = reduction.scene, reduction.problem, solution.reactions
     edge = contact_edge(*given)
     return stick_edge(*given) / edge if edge > 0 else 0.0

@@ -10,9 +10,10 @@ import numpy as np
 import skfem
 
 from contactopt.body import Body, lame
+from contactopt.condensation import ReducedBody
 from contactopt.elements import SHAPES, straight
 from contactopt.problem import Solution
-from contactopt.reduction import ReducedBody, Reduction
+from contactopt.reduction import Reduction
 
 STRESSES = {
     "plane-strain": ("xx", "yy", "zz", "xy"),

@@ -14,12 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.accuracy import Estimate, refine
 from contactopt.edges import contact_edge, stick_edge
 from contactopt.errors import InputError
 from contactopt.methods import default_method, find_method
 from contactopt.operators import InterfaceOperator
 from contactopt.paths import PathResult, follow
 from contactopt.problem import InterfaceProblem, Solution
+from contactopt.quantities import approach
 from contactopt.recover import Fields, recover
 from contactopt.reduction import Reduction
 from contactopt.scene import Scene
@@ -35,6 +37,7 @@ class Result:
     """A solved scene. `summary` is what summary.json holds; `zones` the half-widths of the contact-zone loop.
 
     `path` holds all states of a scene that has a load path; the rest of the result is then that of the last state.
+    `estimate` is what refinement to an asked accuracy found.
     """
 
     scene: Scene
@@ -44,6 +47,7 @@ class Result:
     zones: tuple[float, ...]
     summary: dict[str, Any]
     path: PathResult | None = None
+    estimate: Estimate | None = None
 
     @property
     def problem(self) -> InterfaceProblem:
@@ -72,6 +76,8 @@ def run(
     solver: str = "auto",
     tol: float = 1e-8,
     elements: int | None = None,
+    accuracy: float | None = None,
+    quantity: str | None = None,
     note: Note = lambda text: None,
     **changes: Any,
 ) -> Result:
@@ -83,6 +89,8 @@ def run(
     preconditioner   of methods that take products with Q, a name in contactopt.preconditioners; selects Q = 'implicit'
     Q, solver  form of Q and solver of the bodies, see reduce()
     elements  across the contact half-width;  tol  bound on the natural-map residual;  note  receives progress messages
+    accuracy  bound on the estimated relative error of `quantity`, a name in contactopt.quantities.QUANTITIES: meshes are then
+              refined until it is met or a sentence says why not (Result.estimate); `elements` only scales the first mesh
     Raises InputError with a sentence that says what to do; nothing is left half-written.
     """
     start = time.perf_counter()
@@ -101,9 +109,15 @@ def run(
     method = method or default_method(given)
     chosen = find_method(method, **given)
     backends = chosen.backends(scene.dim)  # refused here, before any work, if one of them cannot be used
+    if (accuracy is None) != (quantity is None):
+        raise InputError("accuracy and quantity belong together: the bound, and the name of what it bounds.")
     target = None if out is None else _writable(Path(out))
-    path, zones = None, list[float]()
-    if states:
+    path, zones, estimate = None, list[float](), None
+    if accuracy is not None and quantity is not None:
+        refined, estimate = refine(states or (scene,), quantity, accuracy, note, Q, solver, method=chosen, tol=tol)
+        reduction, solution, zones, path = refined.reduction, refined.solution, list(refined.zones), refined.path
+        scene = reduction.scene
+    elif states:
         path = follow(states, note=note, Q=Q, solver=solver, method=chosen, tol=tol)
         scene, reduction, solution = path.states[-1].scene, path.reduction, path.solution
     else:
@@ -114,7 +128,9 @@ def run(
     summary = _summary(scene, reduction, solution, method, backends, zones)
     if path is not None:
         summary |= {"states": len(path.states)} | {key: float(path.history[key][-1]) for key in PATH_KEYS}
-    result = Result(scene, reduction, solution, fields, tuple(zones), summary, path)
+    if estimate is not None:
+        summary["accuracy"] = estimate.summary()
+    result = Result(scene, reduction, solution, fields, tuple(zones), summary, path, estimate)
     summary["seconds"] = seconds
     if target is not None:
         note("drawing figures, writing files")
@@ -152,21 +168,13 @@ def _summary(
         "residual": float(solution.residual),
         "outer_iterations": solution.iterations,
         "normal_force": float(r[:, 0].sum()),
-        "approach": _approach(problem, solution),
+        "approach": approach(problem, solution),
         "contact_half_width": float(width),
         "stick_half_width": min(float(width), stick_edge(scene, problem, r)),
         "max_pressure": float((r[:, 0] / problem.areas).max()),
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
     }
-
-
-def _approach(problem: InterfaceProblem, solution: Solution) -> float | None:
-    """By how much the plates bring the bodies together along the mean normal [length]; None without a plate."""
-    if len(solution.multipliers) == 0:
-        return None
-    normal = (problem.V @ solution.multipliers).reshape(problem.q.shape)[:, 0]
-    return -float(np.average(normal, weights=problem.areas))
 
 
 def _squeeze(t: np.ndarray) -> np.ndarray:

@@ -122,5 +122,5 @@ def _coarse(
     rough = settings | {"tol": max(ROUGH, settings.get("tol", 0.0))}
     begin = time.perf_counter()
     reduction, solution, _ = solve_zone(replace(scene, zone=None), elements, note, **rough)
-    seconds["coarse"] += time.perf_counter() - begin
+    seconds.update({"coarse": time.perf_counter() - begin})
     return reduction.problem, solution

@@ -10,17 +10,20 @@ import contactopt
 ROOT = Path(contactopt.__file__).parent
 ORDER = [
     "errors", "scene", "analytic.reference", "analytic.normal", "analytic.panels", "analytic.spence", "analytic.friction",
-    "analytic.mindlin", "analytic.corner", "analytic", "mesh", "disc", "scenes.common", "scenes.flat", "scenes.round", "scenes.sliding", "scenes", "elements", "body", "dissection", "multigrid", "linear", "cones", "operators", "problem", "semismooth", "bonded", "cosine", "preconditioners", "krylov", "subproblems",
+    "analytic.mindlin", "analytic.corner", "analytic", "mesh", "disc", "scenes.common", "scenes.flat", "scenes.round", "scenes.sliding", "scenes", "elements", "refinement", "body", "dissection", "multigrid", "linear", "cones", "operators", "problem", "semismooth", "bonded", "cosine", "preconditioners", "krylov", "subproblems",
     "balance", "mprgp", "models", "backends", "backends.qp", "backends.conic", "backends.direct", "methods",
     "methods.alternating", "methods.tresca", "methods.cone", "methods.apg", "methods.nsgs", "methods.admm",
     "methods.lagrangian", "methods.complementarity", "methods.newton", "methods.proximal",
     "methods.augmented_lagrangian", "methods.auto", "methods.penalty", "driver", "enumeration", "diagnosis", "warm",
-    "interface", "condensation", "reduction", "zone", "edges", "paths", "recover", "fclib", "plots", "animation", "runner",
+    "interface", "condensation", "reduction", "zone", "edges", "quantities", "paths", "accuracy", "recover", "fclib", "plots", "animation", "runner",
     "benchmark.plugins", "benchmark.problems", "benchmark.runs", "benchmark.experiment", "benchmark.store",
     "benchmark.measure", "benchmark.worker", "benchmark.pool", "benchmark.tables",
     "benchmark.figures", "benchmark.report", "benchmark.campaign", "benchmark", "cli", "__main__",
 ]  # fmt: skip
 FINITE_ELEMENTS = {
+    "accuracy",
+    "quantities",
+    "refinement",
     "interface",
     "mesh",
     "elements",
