@@ -20,7 +20,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,11 +37,10 @@ from contactopt.warm import transfer
 from contactopt.zone import AGREE, LOOPS, contact_half_width, pressed
 
 COARSEST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least
-BELOW = 4  # and by how much fewer than the scene's default
+BELOW = 8  # and by how much fewer than the scene's default
 LARGEST = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about a gigabyte and half a minute
 SLOWEST = 0.5  # least order that is trusted
 STUCK = 0.1  # order below which a sequence does not converge
-SAME = 1e-12  # differences below this fraction of the value are rounding
 
 Note = Callable[[str], None]
 
@@ -66,7 +65,7 @@ class Estimate:
 
     value         on the last mesh;  extrapolated: less the estimated error
     error         estimated, relative to the value;  mesh_error, grading_error: its two parts, signed
-    order         observed of the first part, nan if the sequence is not monotone
+    order         observed of the first part, None if the sequence is not monotone
     reached       whether error <= target;  message: one sentence
     levels        in the order they were solved
     """
@@ -78,14 +77,10 @@ class Estimate:
     error: float
     mesh_error: float
     grading_error: float
-    order: float
+    order: float | None
     reached: bool
     message: str
     levels: tuple[Level, ...]
-
-    def summary(self) -> dict[str, Any]:
-        """As plain numbers and words, for JSON."""
-        return asdict(self) | {"levels": [asdict(level) for level in self.levels]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +92,13 @@ class Solved:
     solution: Solution
     zones: tuple[float, ...] = ()
     path: PathResult | None = None
+
+    @property
+    def failure(self) -> str:
+        """One sentence, or nothing if it was solved."""
+        if self.solution.solved:
+            return ""
+        return f"the mesh of {self.level.unknowns} unknowns was not solved: {self.solution.message}"
 
 
 def refine(
@@ -122,7 +124,7 @@ def refine(
     while True:
         mesh, order, grading = *search.mesh_error(), search.grading_error()
         size = max(abs(mesh + grading), abs(mesh) / 2, abs(grading) / 2)
-        error = size / max(abs(search.value), SAME * size) if size else 0.0
+        error = size / (abs(search.value) or 1.0)
         note(f"{quantity} {search.value:.6g}, estimated error {error:.1e}")
         message = search.obstacle()
         if message or error <= accuracy:
@@ -131,7 +133,7 @@ def refine(
         if message:
             break
     last = search.final()
-    message = message or ("" if last.solution.solved else unsolved(last))
+    message = message or last.failure
     value, scale = last.level.value, abs(search.value) or 1.0
     coarse = sum(level.seconds for level in search.levels) - last.level.seconds
     last = replace(last, solution=replace(last.solution, seconds=last.solution.seconds | {"coarse": coarse}))
@@ -140,7 +142,7 @@ def refine(
         accuracy,
         value,
         value - mesh - grading,
-        float(error),
+        error,
         mesh / scale,
         grading / scale,
         order,
@@ -151,25 +153,21 @@ def refine(
     return last, estimate
 
 
-def remainder(before: float | None, last: float, best: float) -> tuple[float, float]:
-    """Sum of all further differences of a sequence under halving, and its order, nan if unknown.
+def remainder(before: float | None, last: float, best: float) -> tuple[float, float | None]:
+    """Sum of all further differences of a sequence under halving, and its order, None if unknown.
 
     before, last  its last two differences: the order is log2(before / last), held within SLOWEST and `best`. Never
     less than what `best` leaves of the difference before, since a small last one may be luck; where the two have
     opposite signs the remainder is as large as the last difference, or a quarter of the one before.
     """
-    if before is None or before == 0 or last == 0:
-        size, order = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1), np.nan
-    elif before / last < 0:
-        size, order = max(abs(last), abs(before) / 4), np.nan
-    else:
+    order = None
+    size = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1)
+    if before and last and before / last < 0:
+        size = max(abs(last), abs(before) / 4)
+    elif before and last:
         order = float(np.log2(before / last))
-        size = max(abs(last) / (2 ** np.clip(order, SLOWEST, best) - 1), abs(before) / 2**best / (2**best - 1))
+        size = max(size, abs(last) / (2 ** np.clip(order, SLOWEST, best) - 1))
     return float(np.copysign(size, last)), order
-
-
-def unsolved(solved: Solved) -> str:
-    return f"the mesh of {solved.level.unknowns} unknowns was not solved: {solved.solution.message}"
 
 
 class _Search:
@@ -193,8 +191,9 @@ class _Search:
         self.splits = 0
         self.last: Solved | None = None
         self.split_last: Solved | None = None
-        for _ in range(3):
-            self._refine_mesh()
+        self._refine_mesh()
+        while len(self.meshes) < 3 and not self.finer_mesh():
+            pass
         if scene.dim == 2 and not self.given:
             self._split()
 
@@ -202,10 +201,12 @@ class _Search:
     def value(self) -> float:
         return self.meshes[-1].value
 
-    def mesh_error(self) -> tuple[float, float]:
-        """Of the value on the last mesh, signed [unit of the quantity], and its order."""
-        before, last = np.diff([level.value for level in self.meshes[-3:]])
-        rest, order = remainder(before, last, self.best)
+    def mesh_error(self) -> tuple[float, float | None]:
+        """Of the value on the last mesh, signed [unit of the quantity], and its order; infinite for a single mesh."""
+        steps = np.diff([level.value for level in self.meshes[-3:]])
+        if not len(steps):
+            return np.inf, None
+        rest, order = remainder(steps[-2] if len(steps) > 1 else None, steps[-1], self.best)
         return -rest, order
 
     def grading_error(self) -> float:
@@ -219,8 +220,8 @@ class _Search:
     def obstacle(self) -> str:
         """Why it would be in vain to go on, or nothing."""
         assert self.last is not None
-        if not self.last.solution.solved:
-            return unsolved(self.last)
+        if self.last.failure:
+            return self.last.failure
         if self.quantity == "pressure" and at_rim(self.last.reduction, self.last.solution):
             return "the largest pressure is at the edge of the contact surface, a corner, where no mesh bounds it"
         steps = np.diff([level.value for level in self.meshes])
@@ -231,7 +232,9 @@ class _Search:
 
     def finer_mesh(self) -> str:
         """Refine the last mesh; or the reason not to."""
-        growth = self.meshes[-1].unknowns / self.meshes[-2].unknowns
+        dim = self.states[-1].dim
+        counts = [level.unknowns for level in self.meshes[-2:]]
+        growth = counts[1] / counts[0] if len(counts) > 1 else 2.0**dim
         reason = self._too_large(growth, self.splits)
         if not reason:
             self._refine_mesh()
@@ -256,13 +259,12 @@ class _Search:
         return self._solve(*wanted)
 
     def _too_large(self, growth: float, splits: int) -> str:
-        """By how many unknowns the next mesh passes the limit, if it does; the share of the splits is taken from a coarser mesh."""
+        """Says so if the next mesh passes the limit; the factor by which splits add unknowns is that of a coarser mesh."""
         dim = self.states[-1].dim
         counts = {(level.elements, level.splits): level.unknowns for level in self.levels}
-        pairs = [
-            n / counts[elements, 0] for (elements, s), n in counts.items() if s == splits and (elements, 0) in counts
-        ]
-        unknowns = growth * self.meshes[-1].unknowns * (max(pairs) if pairs else 2 ** (dim * splits))
+        factors = [n / counts[key[0], 0] for key, n in counts.items() if key[1] == splits and (key[0], 0) in counts]
+        factor = 1.0 if self.given else max(factors, default=2.0 ** (dim * splits))
+        unknowns = growth * self.meshes[-1].unknowns * factor
         if unknowns <= LARGEST[dim]:
             return ""
         return f"to go on would take up to {unknowns:.2g} unknowns, more than {LARGEST[dim]:,}"

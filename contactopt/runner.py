@@ -8,7 +8,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -129,7 +129,7 @@ def run(
     if path is not None:
         summary |= {"states": len(path.states)} | {key: float(path.history[key][-1]) for key in PATH_KEYS}
     if estimate is not None:
-        summary["accuracy"] = estimate.summary()
+        summary["accuracy"] = asdict(estimate)
     result = Result(scene, reduction, solution, fields, tuple(zones), summary, path, estimate)
     summary["seconds"] = seconds
     if target is not None:
