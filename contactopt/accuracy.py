@@ -42,8 +42,6 @@ LARGEST = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about
 SLOWEST = 0.5  # least order that is trusted
 STUCK = 0.1  # order below which a sequence does not converge
 
-Note = Callable[[str], None]
-
 
 @dataclass(frozen=True)
 class Level:
@@ -63,18 +61,17 @@ class Level:
 class Estimate:
     """What is known of a quantity after the last solve.
 
-    value         on the last mesh;  extrapolated: less the estimated error
-    error         estimated, relative to the value;  mesh_error, grading_error: its two parts, signed
-    order         observed of the first part, None if the sequence is not monotone
-    reached       whether error <= target;  message: one sentence
-    levels        in the order they were solved
+    value         on the last mesh;  extrapolated: less the estimated error, None without one
+    error         estimated, relative to the value, None where there is none to estimate
+    mesh_error, grading_error   its two parts, signed;  order: observed of the first, None if not monotone
+    reached       whether error <= target;  message: one sentence;  levels: in the order they were solved
     """
 
     quantity: str
     target: float
     value: float
-    extrapolated: float
-    error: float
+    extrapolated: float | None
+    error: float | None
     mesh_error: float
     grading_error: float
     order: float | None
@@ -105,7 +102,7 @@ def refine(
     states: Sequence[Scene],
     quantity: str,
     accuracy: float,
-    note: Note = lambda text: None,
+    note: Callable[[str], None] = lambda text: None,
     Q: str = "auto",
     solver: str = "auto",
     **settings: Any,
@@ -124,25 +121,25 @@ def refine(
     while True:
         mesh, order, grading = *search.mesh_error(), search.grading_error()
         size = max(abs(mesh + grading), abs(mesh) / 2, abs(grading) / 2)
-        error = size / (abs(search.value) or 1.0)
-        note(f"{quantity} {search.value:.6g}, estimated error {error:.1e}")
-        message = search.obstacle()
-        if message or error <= accuracy:
+        error = size / (abs(search.meshes[-1].value) or 1.0)
+        message = in_vain = search.obstacle()
+        if in_vain or error <= accuracy:
             break
+        note(f"{quantity} {search.meshes[-1].value:.6g}, estimated error {error:.1e}")
         message = search.finer_grading() if abs(grading) > abs(mesh) else search.finer_mesh()
         if message:
             break
     last = search.final()
     message = message or last.failure
-    value, scale = last.level.value, abs(search.value) or 1.0
+    value, scale = last.level.value, abs(search.meshes[-1].value) or 1.0
     coarse = sum(level.seconds for level in search.levels) - last.level.seconds
     last = replace(last, solution=replace(last.solution, seconds=last.solution.seconds | {"coarse": coarse}))
     estimate = Estimate(
         quantity,
         accuracy,
         value,
-        value - mesh - grading,
-        error,
+        None if in_vain else value - mesh - grading,
+        None if in_vain else error,
         mesh / scale,
         grading / scale,
         order,
@@ -177,9 +174,7 @@ class _Search:
     changes  of the value by the first split, the second, ...: those of the present splits, and at least one
     """
 
-    def __init__(
-        self, states: tuple[Scene, ...], quantity: str, note: Note, forms: dict[str, str], settings: dict[str, Any]
-    ):
+    def __init__(self, states, quantity, note, forms, settings):  # type: ignore[no-untyped-def]
         self.states, self.quantity, self.note, self.forms, self.settings = states, quantity, note, forms, settings
         scene = states[-1]
         self.given = not all(callable(part.mesh) for part in (scene.upper, scene.lower) if isinstance(part, Part))
@@ -192,14 +187,10 @@ class _Search:
         self.last: Solved | None = None
         self.split_last: Solved | None = None
         self._refine_mesh()
-        while len(self.meshes) < 3 and not self.finer_mesh():
+        while len(self.meshes) < 3 and not self.obstacle() and not self.finer_mesh():
             pass
-        if scene.dim == 2 and not self.given:
+        if scene.dim == 2 and not self.given and len(self.meshes) > 1:
             self._split()
-
-    @property
-    def value(self) -> float:
-        return self.meshes[-1].value
 
     def mesh_error(self) -> tuple[float, float | None]:
         """Of the value on the last mesh, signed [unit of the quantity], and its order; infinite for a single mesh."""
@@ -225,20 +216,18 @@ class _Search:
         if self.quantity == "pressure" and at_rim(self.last.reduction, self.last.solution):
             return "the largest pressure is at the edge of the contact surface, a corner, where no mesh bounds it"
         steps = np.diff([level.value for level in self.meshes])
-        steps = steps * np.sign(steps[-1])
-        if len(steps) > 2 and np.all(steps[-2:] > 2**-STUCK * np.abs(steps[-3:-1])):
+        if len(steps) > 2 and np.all(steps[-2:] * np.sign(steps[-1]) > 2**-STUCK * np.abs(steps[-3:-1])):
             return f"the {self.quantity} does not converge: every refinement changes it by as much as the one before"
         return ""
 
     def finer_mesh(self) -> str:
         """Refine the last mesh; or the reason not to."""
-        dim = self.states[-1].dim
         counts = [level.unknowns for level in self.meshes[-2:]]
-        growth = counts[1] / counts[0] if len(counts) > 1 else 2.0**dim
-        reason = self._too_large(growth, self.splits)
-        if not reason:
-            self._refine_mesh()
-        return reason
+        growth = counts[1] / counts[0] if len(counts) > 1 else 2.0 ** self.states[-1].dim
+        if reason := self._too_large(growth, self.splits):
+            return reason
+        self._refine_mesh()
+        return ""
 
     def finer_grading(self) -> str:
         """One split more; or the reason not to."""
@@ -296,11 +285,10 @@ class _Search:
             path = None
             reduction, solution, zones = self._zone_loop(states[0], elements)
         value = QUANTITIES[self.quantity](reduction, solution)
-        zone = zones[-2] if len(zones) > 1 else None
-        seconds, rounds = time.perf_counter() - begin, max(1, len(zones) - 1)
-        level = Level(elements, splits, reduction.dofs, reduction.problem.contacts, rounds, zone, value, seconds)
-        self.levels.append(level)
-        return Solved(level, reduction, solution, tuple(zones), path)
+        size = reduction.dofs, reduction.problem.contacts, max(1, len(zones) - 1)
+        zone = zones[-2] if zones else None
+        self.levels.append(Level(elements, splits, *size, zone, value, time.perf_counter() - begin))
+        return Solved(self.levels[-1], reduction, solution, tuple(zones), path)
 
     def _zone_loop(self, scene: Scene, elements: int) -> tuple[Reduction, Solution, list[float]]:
         """As solve_zone(), from the last mesh's zone and solution."""

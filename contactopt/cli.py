@@ -120,10 +120,9 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _print_estimate(estimate: Any) -> None:
-    print(
-        f"{estimate.quantity} {estimate.value:.6g}, estimated relative error {estimate.error:.1e}, "
-        f"asked for {estimate.target:g}: {estimate.message}"
-    )
+    error = "unknown" if estimate.error is None else f"{estimate.error:.1e}"
+    print(f"{estimate.quantity} {estimate.value:.6g}, estimated relative error {error}, asked for {estimate.target:g}:")
+    print(f"  {estimate.message}")
     for level in estimate.levels:
         print(
             f"  {level.elements} elements, {level.splits} splits: {level.unknowns} unknowns, "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 from statistics import median
 from typing import Any
 
@@ -18,6 +19,7 @@ from contactopt.reduction import reduce_bodies
 from experiments.report import write
 
 REPEATS = 3
+SOLVERS = ("superlu", "pardiso")  # the latter where it is installed
 SCENES = {
     "punch-2d": (lambda: scenes.flat_punch(2, elements=1024), 2),
     "punch-3d": (lambda: scenes.flat_punch(3, elements=28), 4),
@@ -31,7 +33,7 @@ def timed(act: Callable[[], Any]) -> tuple[Any, float, float]:
     return out, time.perf_counter() - wall, time.process_time() - cpu
 
 
-def bonded(upper: Body, lower: Body) -> Callable[[], np.ndarray]:
+def bonded(upper: Body, lower: Body, solver: str) -> Callable[[], np.ndarray]:
     """The direct solve of the bonded bodies under the plate's unit motion: order, factorise, substitute once."""
     count = [b.basis.mesh.p.shape[1] for b in (upper, lower)]
     partner = {tuple(np.round(x, 9)): n for x, n in zip(lower.points.T, lower.nodes)}
@@ -56,15 +58,15 @@ def bonded(upper: Body, lower: Body) -> Callable[[], np.ndarray]:
     A = A[free][:, free].tocsr()
 
     def act() -> np.ndarray:
-        return make_solver("superlu", A, free // dim, free % dim, points).solve(load[free])
+        return make_solver(solver, A, free // dim, free % dim, points).solve(load[free])
 
     return act
 
 
-def frictional(scene: Scene) -> tuple[float, float, Any, Any]:
+def frictional(scene: Scene, solver: str) -> tuple[float, float, Any, Any]:
     """Wall and CPU seconds from assembled bodies to the certified reactions, without assembly."""
     begin = time.process_time()
-    reduction = reduce_bodies(scene)
+    reduction = reduce_bodies(scene, solver=solver)
     cpu_reduction = time.process_time() - begin
     solution, wall, cpu = timed(lambda: solve(reduction.problem, tol=1e-8))
     assemble = reduction.seconds["assemble"]  # one thread: wall is CPU
@@ -72,18 +74,20 @@ def frictional(scene: Scene) -> tuple[float, float, Any, Any]:
     return reduced + wall, cpu_reduction - assemble + cpu, reduction, solution
 
 
-def measure(name: str) -> dict[str, Any]:
+def measure(name: str, solver: str) -> dict[str, Any]:
     scene = SCENES[name][0]()
-    act = bonded(*(build_body(scene, part, scene.elements, scene.zone) for part in (scene.upper, scene.lower)))
+    upper, lower = (build_body(scene, part, scene.elements, scene.zone) for part in (scene.upper, scene.lower))
+    act = bonded(upper, lower, solver)
     rows = []
     for _ in range(REPEATS):
         _, wall, cpu = timed(act)
-        total, total_cpu, reduction, solution = frictional(scene)
+        total, total_cpu, reduction, solution = frictional(scene, solver)
         rows.append((wall, cpu, total, total_cpu, total / wall, total_cpu / cpu))
     linear, _, total, _, ratio, ratio_cpu = (median(column) for column in zip(*rows))
     form = "implicit" if solution.products else "explicit"
     return {
         "scene": name,
+        "solver": solver,
         "unknowns": reduction.dofs,
         "contacts": reduction.problem.contacts,
         "Q": form,
@@ -101,7 +105,7 @@ def measure(name: str) -> dict[str, Any]:
 
 TEXT = f"""From assembled bodies to certified reactions (residual at most 1e-8): both bodies factorised at the same time on two
 cores, Newton's method. Against it one direct solve of the same two bodies bonded at the contact nodes, the plate's motion
-given: nested dissection, SuperLU, one forward and backward substitution, the same ordering and solver. Medians of
+given: the same solver and ordering, one forward and backward substitution. Medians of
 {REPEATS} runs in turn, `OMP_NUM_THREADS=1`. The second ratio counts the seconds of both threads.
 
 {{ratios}}
@@ -113,12 +117,17 @@ factor, so that each has its own core. What friction itself adds are the steps b
 """
 
 
-def phases(name: str) -> dict[str, Any]:
-    *_, reduction, solution = frictional(SCENES[name][0]())
-    return {"scene": name, **{f"{k} [s]": v for k, v in (reduction.seconds | solution.seconds).items()}}
+def phases(name: str, solver: str) -> dict[str, Any]:
+    *_, reduction, solution = frictional(SCENES[name][0](), solver)
+    return {
+        "scene": name,
+        "solver": solver,
+        **{f"{k} [s]": v for k, v in (reduction.seconds | solution.seconds).items()},
+    }
 
 
 if __name__ == "__main__":
     names = sys.argv[1:] or list(SCENES)
-    tables = {"ratios": [measure(n) for n in names], "phases": [phases(n) for n in names]}
+    pairs = [(n, s) for n in names for s in SOLVERS if s != "pardiso" or find_spec("pypardiso")]
+    tables = {"ratios": [measure(*pair) for pair in pairs], "phases": [phases(*pair) for pair in pairs]}
     write("cost_ratio", "The price of friction", TEXT, tables, {})
