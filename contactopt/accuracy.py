@@ -61,9 +61,9 @@ class Level:
 class Estimate:
     """What is known of a quantity after the last solve.
 
-    value         on the last mesh;  extrapolated: less the estimated error, None without one
-    error         estimated, relative to the value, None where there is none to estimate
-    mesh_error, grading_error   its two parts, signed;  order: observed of the first, None if not monotone
+    value         on the last mesh;  extrapolated: less the estimated error
+    error         estimated, relative to the value;  mesh_error, grading_error: its two parts, signed; None where unknown
+    order         observed of the first part, None if the sequence is not monotone
     reached       whether error <= target;  message: one sentence;  levels: in the order they were solved
     """
 
@@ -72,8 +72,8 @@ class Estimate:
     value: float
     extrapolated: float | None
     error: float | None
-    mesh_error: float
-    grading_error: float
+    mesh_error: float | None
+    grading_error: float | None
     order: float | None
     reached: bool
     message: str
@@ -131,23 +131,15 @@ def refine(
             break
     last = search.final()
     message = message or last.failure
-    value, scale = last.level.value, abs(search.meshes[-1].value) or 1.0
     coarse = sum(level.seconds for level in search.levels) - last.level.seconds
     last = replace(last, solution=replace(last.solution, seconds=last.solution.seconds | {"coarse": coarse}))
-    estimate = Estimate(
-        quantity,
-        accuracy,
-        value,
-        None if in_vain else value - mesh - grading,
-        None if in_vain else error,
-        mesh / scale,
-        grading / scale,
-        order,
-        not message,
-        message or f"the estimated error of the {quantity} is below the target",
-        tuple(search.levels),
-    )
-    return last, estimate
+    value, scale = last.level.value, abs(search.meshes[-1].value) or 1.0
+    parts: dict[str, Any] = dict.fromkeys(("extrapolated", "error", "mesh_error", "grading_error", "order"))
+    if not in_vain and np.isfinite(error):
+        parts = dict(zip(parts, (value - mesh - grading, error, mesh / scale, grading / scale, order)))
+    sentence = message or f"the estimated error of the {quantity} is below the target"
+    levels = tuple(search.levels)
+    return last, Estimate(quantity, accuracy, value, reached=not message, message=sentence, levels=levels, **parts)
 
 
 def remainder(before: float | None, last: float, best: float) -> tuple[float, float | None]:
@@ -172,6 +164,7 @@ class _Search:
 
     meshes   levels of the main sequence: doubled elements without splits, or, where the meshes are given, splits alone
     changes  of the value by the first split, the second, ...: those of the present splits, and at least one
+    share    by which the first split multiplies the unknowns, on a coarse mesh: an upper bound for finer ones
     """
 
     def __init__(self, states, quantity, note, forms, settings):  # type: ignore[no-untyped-def]
@@ -183,7 +176,7 @@ class _Search:
         self.levels: list[Level] = []
         self.meshes: list[Level] = []
         self.changes: list[float] = []
-        self.splits = 0
+        self.splits, self.share = 0, 1.0
         self.last: Solved | None = None
         self.split_last: Solved | None = None
         self._refine_mesh()
@@ -248,12 +241,9 @@ class _Search:
         return self._solve(*wanted)
 
     def _too_large(self, growth: float, splits: int) -> str:
-        """Says so if the next mesh passes the limit; the factor by which splits add unknowns is that of a coarser mesh."""
+        """A sentence if the next mesh passes the limit."""
         dim = self.states[-1].dim
-        counts = {(level.elements, level.splits): level.unknowns for level in self.levels}
-        factors = [n / counts[key[0], 0] for key, n in counts.items() if key[1] == splits and (key[0], 0) in counts]
-        factor = 1.0 if self.given else max(factors, default=2.0 ** (dim * splits))
-        unknowns = growth * self.meshes[-1].unknowns * factor
+        unknowns = growth * self.meshes[-1].unknowns * self.share**splits
         if unknowns <= LARGEST[dim]:
             return ""
         return f"to go on would take up to {unknowns:.2g} unknowns, more than {LARGEST[dim]:,}"
@@ -271,6 +261,8 @@ class _Search:
         if (elements, splits - 1) not in known:
             known[elements, splits - 1] = self._solve(elements, splits - 1).level.value
         self.split_last = self._solve(elements, splits)
+        if splits == 1:
+            self.share = self.split_last.level.unknowns / self.meshes[1].unknowns
         self.changes.append(self.split_last.level.value - known[elements, splits - 1])
 
     def _solve(self, elements: int, splits: int) -> Solved:

@@ -29,7 +29,7 @@ class Body:
     lift    (n,) prescribed displacements of the supports, 0 elsewhere
     motion  (n, p) unit motions of the p plate components that may move; zero on free unknowns
     thrust  (p,) total forces on them
-    nodes   (k,) vertices of the candidate contact boundary
+    nodes   (k,) contact nodes on the candidate contact boundary
     areas   (k,) nodal areas, the integrals of the hat functions over it
     normals (dim, k) outward unit normals there, averaged over the facets
     weights (k, nodes) what the displacement of the nodes contributes to that of the contacts (contactopt.elements)
@@ -68,12 +68,17 @@ class Body:
     @property
     def points(self) -> np.ndarray:
         """Coordinates of the contact nodes, (dim, k)."""
-        return np.asarray(self.basis.mesh.p[:, self.nodes])
+        return self.locations[:, self.nodes]
+
+    @cached_property
+    def surface(self) -> np.ndarray:
+        """All nodes of the contact boundary, (m,)."""
+        return np.unique(self.weights.indices)
 
     @property
     def contact_dofs(self) -> np.ndarray:
-        """Displacement unknowns of the nodes on the contact boundary, (m, dim); at degree 1 those of the k contacts."""
-        return np.asarray(self.unknowns[:, np.unique(self.weights.indices)].T)
+        """Displacement unknowns of all nodes of the contact boundary, (m, dim); m = k but for quadratic simplices."""
+        return np.asarray(self.unknowns[:, self.surface].T)
 
 
 def lame(material: Material) -> tuple[float, float]:

@@ -1,18 +1,18 @@
 """Displacement of degree 1 or 2 on triangles, quadrilaterals, tetrahedra and hexahedra, and its trace on the contact surface.
 
-Contact is written at the vertices of the contact surface, with nodal areas A_i = int phi_i > 0 of the hat functions phi_i
-(linear on triangles, bilinear on quadrilaterals). A contact force r_i acts on the nodes j of the body by r_i W_ij, and
-W_ij u_j is the displacement at contact i; every row of W adds up to 1.
+Quadratic shape functions N_j cannot weigh contact forces themselves: on the faces of tetrahedra, and next to an axis of
+symmetry, their integrals vanish at the vertices. So the contact surface is covered by linear cells with hat functions
+phi_i and nodal areas A_i = int phi_i > 0, and their nodes are the contacts: the halves and quarters of the faces of
+quadrilaterals and hexahedra, the whole faces of triangles and tetrahedra, whose forces at vertices and edges would
+alternate (experiments.elements). A contact force r_i acts on the nodes j by r_i W_ij, the displacement at contact i is
+W_ij u_j,
 
-    degree 1   W_ij = delta_ij
-    degree 2   W_ij = int phi_i N_j / A_i, N_j the quadratic shape functions: the traction is the piecewise linear
-               function of the nodal values r_i / A_i, and the gap that may not be negative is the mean weighted by phi_i
+    W_ij = int psi_i N_j / A_i,    psi_i linear on each cell,  int psi_i phi_j = delta_ij A_i   (dual basis).
 
-A force at each quadratic node instead would do for lines and for the nine-node face of a brick, not for the six-node
-face of a tetrahedron, where int N_j = 0 at the vertices. A piecewise linear traction is as accurate as the quadratic
-displacement deserves, and stable. Source: Hueber, Mair, Wohlmuth (2005), A priori error estimates and an inexact
-primal-dual active set strategy for linear and quadratic finite elements applied to multibody contact problems,
-Appl. Numer. Math. 54, 555-576.
+The psi_i add up to one: W has unit row sums, and A_i W_ij sums to int N_j, so that uniform pressure is exact. At degree 1
+W is the identity. Sources: Wohlmuth (2000), A mortar finite element method using dual spaces for the Lagrange multiplier,
+SIAM J. Numer. Anal. 38, 989-1012; Popp, Wohlmuth, Gee, Wall (2012), Dual quadratic mortar finite element methods for 3D
+finite deformation contact, SIAM J. Sci. Comput. 34, B421-B446.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 import skfem
+from skfem.quadrature import get_quadrature
+from skfem.refdom import RefLine, RefQuad, RefTri
 
 SHAPES = {
     "RefTri": (skfem.MeshTri, {1: skfem.ElementTriP1, 2: skfem.ElementTriP2}),
@@ -27,6 +29,21 @@ SHAPES = {
     "RefTet": (skfem.MeshTet, {1: skfem.ElementTetP1, 2: skfem.ElementTetP2}),
     "RefHex": (skfem.MeshHex, {1: skfem.ElementHex1, 2: skfem.ElementHex2}),
 }
+_LINE = RefLine, skfem.ElementLineP1(), np.array([[0.0, 1.0, 0.5]])
+_TRIANGLE = RefTri, skfem.ElementTriP1(), np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]])
+_SQUARE = (
+    RefQuad,
+    skfem.ElementQuad1(),
+    np.array([[0.0, 1.0, 1.0, 0.0, 0.5, 1.0, 0.5, 0.0, 0.5], [0.0, 0.0, 1.0, 1.0, 0.0, 0.5, 1.0, 0.5, 0.5]]),
+)
+# faces: reference cell, hat functions, places of the quadratic nodes with the vertices first; the cells at degree 2
+FACES = {
+    "RefTri": (*_LINE, np.array([[0, 1]])),
+    "RefQuad": (*_LINE, np.array([[0, 2], [2, 1]])),
+    "RefTet": (*_TRIANGLE, np.array([[0, 1, 2]])),
+    "RefHex": (*_SQUARE, np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])),
+}
+NOISE = 1e-14  # what rounding leaves of a zero
 
 
 def weight_at(weight: tuple[float, bool], x: np.ndarray) -> np.ndarray | float:
@@ -65,22 +82,50 @@ def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
 def contact_trace(
     basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: tuple[float, bool]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, sp.csr_matrix]:
-    """Vertices (k,), areas (k,), outward unit normals (dim, k) and W (k, nodes) of a contact boundary."""
-    mesh, shapes = basis.mesh, SHAPES[basis.mesh.refdom.__name__][1]
-    hats = skfem.FacetBasis(mesh, shapes[1](), facets=boundary, intorder=3 if degree == 1 else 5)
-
-    def integrate(value) -> np.ndarray:  # type: ignore[no-untyped-def]
-        return skfem.LinearForm(lambda v, w: value(w) * v).assemble(hats)
-
-    nodes = np.unique(mesh.facets[:, boundary])
-    areas = integrate(lambda w: weight_at(weight, w.x))[nodes]
-    normals = np.stack([integrate(lambda w, i=i: w.n[i])[nodes] for i in range(mesh.p.shape[0])])
-    normals /= np.linalg.norm(normals, axis=0)
-    normals = np.where(np.abs(normals) < 1e-14, 0.0, normals)  # exact axes stay exact
+    """Nodes (k,), areas (k,), outward unit normals (dim, k) and W (k, nodes of the body) of a contact boundary."""
+    mesh, name = basis.mesh, basis.mesh.refdom.__name__
+    shape, (face, hat, places, cells) = SHAPES[name][1][degree](), FACES[name]
     if degree == 1:
-        W = sp.csr_matrix((np.ones(len(nodes)), (np.arange(len(nodes)), nodes)), (len(nodes), int(mesh.nvertices)))
-        return nodes, areas, normals, W
-    fine = skfem.FacetBasis(mesh, shapes[degree](), facets=boundary, quadrature=hats.quadrature)
-    overlap = skfem.BilinearForm(lambda u, v, w: weight_at(weight, w.x) * u * v).assemble(fine, hats)
-    order = node_unknowns(fine)[0]
-    return nodes, areas, normals, sp.csr_matrix(sp.diags(1 / areas) @ overlap[nodes][:, order])
+        cells = np.arange(cells.shape[1])[None]
+        places = places[:, cells[0]]
+    points, share = get_quadrature(face, degree + 2)
+    phi = np.stack([hat.lbasis(points, v)[0] for v in range(cells.shape[1])])  # (v, point of a cell)
+    rule = np.concatenate([places[:, c] @ phi for c in cells], axis=1), np.tile(share / len(cells), len(cells))
+    fine = skfem.FacetBasis(mesh, shape, facets=boundary, quadrature=rule)
+    local, node = _nodes_on_faces(mesh, shape, boundary, places)
+    split = (len(boundary), len(cells), len(share))  # face, cell, point
+    N = np.stack([np.asarray(f[0]) for f in fine.basis], axis=1)
+    N = np.take_along_axis(N, local[:, :, None], axis=1).reshape(
+        len(boundary), -1, *split[1:]
+    )  # (face, j, cell, point)
+    flat = np.asarray(fine.dx).reshape(split)
+    measure = flat * np.broadcast_to(weight_at(weight, np.asarray(fine.global_coordinates())), fine.dx.shape).reshape(
+        split
+    )
+    area = np.einsum("vq,fcq->fcv", phi, measure)
+    mass = np.einsum("vq,wq,fcq->fcvw", phi, phi, measure)
+    mixed = np.einsum("vq,fjcq,fcq->fcvj", phi, N, measure)
+    dual = area[..., None] * np.linalg.solve(mass, mixed)  # int psi_v N_j of each cell
+    nodes, rows = np.unique(node[:, cells], return_inverse=True)
+    rows = rows.reshape(area.shape)
+    areas = np.bincount(rows.ravel(), area.ravel())
+    normal = np.einsum("vq,dfcq,fcq->dfcv", phi, np.asarray(fine.normals).reshape(-1, *split), flat)
+    normals = np.stack([np.bincount(rows.ravel(), n.ravel()) for n in normal])
+    normals = normals / np.linalg.norm(normals, axis=0)
+    entries = np.broadcast_arrays(dual, rows[..., None], node[:, None, None, :])
+    value, row, column = (x.ravel() for x in entries)
+    W = sp.csr_matrix((value, (row, column)), (len(nodes), node_unknowns(basis).shape[1]))
+    W = sp.csr_matrix(sp.diags(1 / areas) @ W)
+    W.data = np.where(np.abs(W.data) < NOISE, 0.0, W.data)
+    W.eliminate_zeros()
+    return nodes, areas, np.where(np.abs(normals) < NOISE, 0.0, normals), W  # exact axes stay exact
+
+
+def _nodes_on_faces(
+    mesh: skfem.Mesh, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of every facet (f, m): the shape function that is one at each of the places, and the node it belongs to."""
+    at = skfem.FacetBasis(mesh, shape, facets=boundary, quadrature=(places, np.ones(places.shape[1])))
+    local = np.argmax(np.stack([np.asarray(f[0]) for f in at.basis], axis=1), axis=1)
+    unknowns = np.take_along_axis(at.element_dofs.T, local, axis=1)
+    return local, np.argsort(node_unknowns(at)[0])[unknowns]

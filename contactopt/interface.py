@@ -37,14 +37,13 @@ def match_bodies(scene: Scene, upper: Body | None, lower: Body | None) -> tuple[
 
 
 def _rigid_gap(body: Body, rigid: Rigid) -> np.ndarray:
-    """Initial gap (k,) between a body and a rigid one: of the nodes on its contact boundary, as their displacement."""
+    """Initial gap (k,) between a body and a rigid one: what the gaps of the nodes contribute, as their displacements."""
     if rigid.gap is None:
         return np.zeros(len(body.nodes))
-    surface = np.unique(body.weights.indices)
-    gap = np.asarray(rigid.gap(body.locations[:, surface]), dtype=float)
-    if gap.shape != surface.shape or not np.all(np.isfinite(gap)):
+    gap = np.asarray(rigid.gap(body.locations[:, body.surface]), dtype=float)
+    if gap.shape != body.surface.shape or not np.all(np.isfinite(gap)):
         raise InputError(f"the gap of rigid body '{rigid.name}' must give one finite number per contact node.")
-    return np.asarray(body.weights[:, surface] @ gap)
+    return np.asarray(body.weights[:, body.surface] @ gap)
 
 
 def _match(upper: Body, lower: Body) -> tuple[np.ndarray, np.ndarray]:
@@ -88,4 +87,4 @@ def _frames(normals: np.ndarray) -> np.ndarray:
 def positions(bodies: list[Body | None], nodes: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     body, own = (bodies[1], nodes[1]) if bodies[1] is not None else (bodies[0], nodes[0])
     assert body is not None
-    return np.asarray(body.basis.mesh.p[:, own])
+    return body.locations[:, own]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import brentq
-from skfem import MeshHex, MeshQuad
+from skfem import MeshHex, MeshQuad, MeshTet, MeshTri
+
+from contactopt.errors import InputError
 
 
 def graded(length: float, first: float, growth: float) -> np.ndarray:
@@ -87,3 +89,21 @@ def patch(mesh: MeshQuad | MeshHex, boundary: str, name: str, limits: list[float
     middle = mesh.p[:, mesh.facets[:, facets]].mean(axis=1)
     inside = np.all([middle[i] < limit for i, limit in enumerate(limits)], axis=0)
     return mesh.with_boundaries({name: facets[inside]})
+
+
+def simplices(mesh: MeshQuad | MeshHex) -> MeshTri | MeshTet:
+    """Every quadrilateral cut into two triangles, every hexahedron into six tetrahedra; boundaries keep their names.
+
+    Bodies cut from meshes with the same cells on their contact faces match there, since all cells are cut the same way.
+    Raises InputError if neighbours are cut differently: number the vertices of all cells in the same order.
+    """
+    cut = mesh.to_meshtri() if isinstance(mesh, MeshQuad) else MeshHex.to_meshtet(mesh)
+    cut = type(cut)(cut.p, cut.t)
+    facets = cut.boundary_facets()
+    if len(facets) != (len(mesh.p) - 1) * len(mesh.boundary_facets()):
+        raise InputError("the mesh cannot be cut into simplices: its cells number their vertices in different orders.")
+    sides = mesh.t2f[:, cut.f2t[0, facets] % mesh.nelements]  # those of the cell that each outer facet comes from
+    corners = mesh.facets[:, sides]  # (corner, side, facet)
+    inside = np.all([np.any(corners == vertex, axis=0) for vertex in cut.facets[:, facets]], axis=0)
+    origin = sides[np.argmax(inside, axis=0), np.arange(len(facets))]
+    return cut.with_boundaries({name: facets[np.isin(origin, old)] for name, old in (mesh.boundaries or {}).items()})

@@ -47,7 +47,7 @@ def peak_pressure(reduction: Reduction, solution: Solution) -> float:
     p^2, which is quadratic under Hertz's ellipse, is fitted by a polynomial about the node of the largest pressure, up to half-way
     to the edge, weighted by the nodal areas. That removes the error of the single node: on the axis of an
     axisymmetric mesh the nodal value is some 1 % low, since the strain u_r / r is poorly resolved there, on a ring
-    whose area counts for nothing. Where the window has no room, the nodal value.
+    whose area counts for nothing. At the rim of the contact surface, and where the window has no room, the nodal value.
     """
     from contactopt.zone import pressed
 
@@ -60,7 +60,7 @@ def peak_pressure(reduction: Reduction, solution: Solution) -> float:
     outside = ~pressed(solution.reactions)[node]
     edge = distance[outside].min() if outside.any() else distance.max()
     near = distance < WINDOW * edge
-    if len(np.unique(distance[near])) < 3:
+    if at_rim(reduction, solution) or len(np.unique(distance[near])) < 3:
         return float(pressure[top])
     degree = 4 if near.sum() >= 2 * 5 ** len(x) else 2
     powers = np.stack(np.meshgrid(*[np.arange(degree + 1)] * len(x), indexing="ij")).reshape(len(x), -1)

@@ -160,7 +160,7 @@ def reduce_bodies(
 def form_of(m: int, n: int, dim: int, iterative: bool) -> str:
     """The cheaper form of Q: 'explicit' or 'implicit', from counts of operations.
 
-    m interface unknowns, n unknowns of the larger body, `iterative` if it has no factors.
+    m unknowns on the contact boundary, n unknowns of the larger body, `iterative` if it has no factors.
     Explicit: m^3 / 3 to eliminate the contact unknowns last, at the speed of a sparse factorisation, and about 3 m^3 for the
     inverse and Newton's steps at DENSE times that speed. Implicit: PRODUCTS solves of 4 operations per entry of the
     factors, of which nested dissection leaves 4 n log2 n in 2D and 17 n^(4/3) in 3D (fitted to our bodies). Bodies without

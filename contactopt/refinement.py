@@ -14,16 +14,17 @@ from contactopt.scene import Part, Scene
 
 
 def split(mesh: Any, contact: str) -> Any:
-    """The mesh with all elements halved; in the plane, new nodes of a curved contact boundary lie on a cubic spline.
+    """The plane mesh with all elements halved, new nodes of a curved contact boundary on a cubic spline.
 
     The spline gives the height over the coordinate along which the boundary extends most, so that partners on
-    two bodies stay partners. Raises InputError for meshes with curved elements.
+    two bodies stay partners. Raises InputError for meshes of solids (scikit-fem drops their boundaries) or of curved elements.
     """
-    if is_curved(mesh):
-        raise InputError("meshes with curved elements cannot be refined here; give a mesh function of `elements`.")
+    if is_curved(mesh) or len(mesh.p) > 2:
+        raise InputError(
+            "a given mesh can be refined only if it is plane with straight elements; give the part a function "
+            "(elements, zone) -> mesh instead."
+        )
     fine = mesh.refined(1)
-    if len(mesh.p) > 2:
-        return fine
     old, new = (np.unique(m.facets[:, m.boundaries[contact]]) for m in (mesh, fine))
     along = int(np.argmax(np.ptp(mesh.p[:, old], axis=1)))
     order = old[np.argsort(mesh.p[along, old])]

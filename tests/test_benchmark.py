@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, benchmark, natural_map_residual, solve
-from contactopt.benchmark import pool, problems
+from contactopt.benchmark import pool, problems, store
 from contactopt.benchmark.experiment import read_experiment
 from contactopt.benchmark.measure import Task, associated_residual
 from contactopt.benchmark.pool import Shares, Worker
@@ -236,6 +236,12 @@ def test_a_campaign_needs_resume_to_go_on_and_one_writer(tmp_path):
     with Store(tmp_path / "out", resume=True), pytest.raises(InputError, match="another campaign"):
         run(tmp_path, SMALL, resume=True)
     assert len(run(tmp_path, SMALL, resume=True)) == 12
+
+
+def test_missing_packages_are_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(store, "find_spec", lambda name: None if name == "tqdm" else name)
+    with pytest.raises(InputError, match=r"need tqdm; .*contactopt\[benchmark\]"):
+        benchmark.run_campaign(written(tmp_path, SMALL), tmp_path / "out")
 
 
 def test_filters(tmp_path):

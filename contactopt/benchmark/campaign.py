@@ -14,7 +14,7 @@ from contactopt.benchmark.experiment import Experiment, NothingToRun, read_exper
 from contactopt.benchmark.measure import Task
 from contactopt.benchmark.pool import run_locally, run_on_cluster
 from contactopt.benchmark.report import build, publish
-from contactopt.benchmark.store import Store, load, save
+from contactopt.benchmark.store import Store, load, require, save
 from contactopt.errors import InputError
 
 
@@ -36,6 +36,7 @@ def run_campaign(
     scheduler  address of a Dask scheduler, instead of local processes
     Raises InputError on an experiment that cannot be run, or results in the folder without `resume`.
     """
+    require("pandas", "pyarrow", "tqdm")
     if not isinstance(experiment, Experiment):
         experiment = read_experiment(experiment)
     if jobs is not None and jobs < 1:

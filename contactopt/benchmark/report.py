@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contactopt.benchmark.figures import FIGURES
-from contactopt.benchmark.store import COLUMNS, load, save
+from contactopt.benchmark.store import COLUMNS, load, require, save
 from contactopt.benchmark.tables import TABLES, select
 from contactopt.errors import InputError
 
@@ -90,6 +90,7 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
 
     Raises InputError if none has one, or if a figure's arguments do not fit its table.
     """
+    require("markdown_it", "pandas")
     reports, bodies, errors = Path(reports), [], []
     for path in experiments:
         try:

@@ -12,6 +12,7 @@ import json
 import os
 import tempfile
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,6 +88,13 @@ STATUSES = {s.label: s.sentence for s in Status} | {
     "not_built": "the problem itself could not be built",
 }
 REFERENCE = 1e-8  # largest residual of a reference solution
+
+
+def require(*modules: str) -> None:
+    """InputError with what to install if one of the benchmark layer's own dependencies is missing."""
+    missing = [name for name in modules if find_spec(name) is None]
+    if missing:
+        raise InputError(f"benchmarks need {', '.join(missing)}; install with: pip install 'contactopt[benchmark]'")
 
 
 class Store:
@@ -165,6 +173,7 @@ def load(path: str | Path) -> pd.DataFrame:
     Parameters of the problem and settings of the method are added as columns problem.NAME and method.NAME.
     Raises InputError if there is no table, or one of a newer schema.
     """
+    require("pandas", "pyarrow")
     import pandas as pd
 
     path = Path(path)

@@ -30,7 +30,7 @@ from contactopt.problem import InterfaceProblem
 from contactopt.semismooth import RIDGE, Equations
 
 FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-4  # accuracy of an iterative step: the first, and the bounds of the others
-SHARP = 1e-2  # accuracy of a residual, over the residual that the step aimed at
+SHARP = 1e-4  # accuracy of a residual, over the residual that the step aimed at
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
 LOOSE = 0.5  # share of contacts that do not stick, up to which the bonded factorisation is cheaper than a new one
 

@@ -1,0 +1,200 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import two_blocks
+from skfem import MeshQuad
+
+from contactopt import InputError, cli, run, scenes, solve
+from contactopt.accuracy import LARGEST, refine, remainder
+from contactopt.quantities import QUANTITIES, at_rim, peak_pressure
+from contactopt.reduction import reduce_bodies
+from contactopt.refinement import split
+from contactopt.scene import Material, Support
+
+
+def punch(**changes):
+    """Rigid flat punch on a small block, without friction: quick."""
+    return scenes.flat_punch(2, **{"rigid": "punch", "mu": 0.0, "elements": 8} | changes)
+
+
+# The estimate
+
+
+@pytest.mark.parametrize("order", [0.5, 1.0, 1.7, 2.0])
+def test_the_remainder_of_a_power_of_the_mesh_size_is_exact(order):
+    values = 3 + 0.1 * 2.0 ** (-order * np.arange(3))
+    rest, found = remainder(*np.diff(values), 2)
+    assert found == pytest.approx(order)
+    assert values[-1] + rest == pytest.approx(3, abs=1e-12)
+
+
+def test_the_remainder_does_not_trust_luck():
+    assert remainder(1.0, 1e-6, 2)[0] == pytest.approx(1 / 12)  # what second order leaves of the difference before
+    assert remainder(1.0, 0.9, 2)[0] == pytest.approx(0.9 / (np.sqrt(2) - 1))  # no slower than order 1/2
+    rest, order = remainder(1.0, -0.1, 2)
+    assert rest == pytest.approx(-0.25) and order is None
+    assert remainder(None, 0.3, 2) == (pytest.approx(0.1), None)
+    assert remainder(0.0, 0.0, 2)[0] == 0
+
+
+# Meshes with halved elements
+
+
+def test_split_keeps_boundaries_and_puts_nodes_on_the_arc():
+    sphere = scenes.sphere()
+    coarse = sphere.upper.mesh(8, 20.0)
+    fine = split(coarse, "contact")
+    assert fine.nelements == 4 * coarse.nelements
+    assert set(fine.boundaries) == set(coarse.boundaries)
+    nodes = np.unique(fine.facets[:, fine.boundaries["contact"]])
+    x, z = fine.p[:, nodes]
+    sagitta = 400 - np.sqrt(400**2 - (20 / 16) ** 2)
+    assert np.abs(z - (400 - np.sqrt(400**2 - x**2))).max() < 1e-4 * sagitta
+    assert np.allclose(np.diff(np.sort(x))[:10], 20 / 16)
+
+
+def test_split_of_a_flat_mesh_stays_flat():
+    mesh = MeshQuad().with_boundaries({"contact": lambda x: x[1] == 0}).refined(2)
+    fine = split(mesh, "contact")
+    assert np.ptp(fine.p[1, np.unique(fine.facets[:, fine.boundaries["contact"]])]) == 0
+
+
+# Quantities
+
+
+def test_the_fitted_peak_is_hertz_where_the_axis_node_is_not():
+    scene = scenes.sphere(mu=0.0, radius=4000, foundation_radius=8000, foundation_height=8000, rigid="sphere")
+    reduction = reduce_bodies(scene, 32, scene.reference.half_width)
+    solution = solve(reduction.problem)
+    nodal = solution.reactions[0, 0] / reduction.problem.areas[0]
+    assert abs(nodal / scene.reference.peak - 1) > 5e-3
+    assert peak_pressure(reduction, solution) == pytest.approx(scene.reference.peak, rel=2e-3)
+
+
+def test_the_peak_of_an_exact_ellipse_is_exact():
+    scene = scenes.sphere(mu=0.0, elements=8)
+    reduction = reduce_bodies(scene)
+    x, areas = reduction.problem.coordinates[0], reduction.problem.areas
+    solution = solve(reduction.problem)
+    reactions = np.zeros_like(solution.reactions)
+    reactions[:, 0] = areas * np.sqrt(np.maximum(0, 1 - (x / x[7]) ** 2))
+    ellipse = replace(solution, reactions=reactions)
+    assert peak_pressure(reduction, ellipse) == pytest.approx(1, rel=1e-9)
+    assert QUANTITIES["width"](reduction, ellipse) == pytest.approx(x[7], rel=1e-9)
+
+
+def test_clapeyron():
+    """Without gap and loads but a plate's, the elastic energy is half the plate's work, which friction shares."""
+    reduction = reduce_bodies(punch())
+    solution = solve(reduction.problem, tol=1e-12)
+    work = 100 * QUANTITIES["approach"](reduction, solution)
+    assert QUANTITIES["energy"](reduction, solution) == pytest.approx(work / 2, rel=1e-9)
+
+
+def test_quantities_in_3d_agree_with_the_plane():
+    """A flat punch on a quarter model presses most at its corner; its peak is at the rim."""
+    reduction = reduce_bodies(scenes.flat_punch(3, elements=4))
+    assert at_rim(reduction, solve(reduction.problem))
+    reduction = reduce_bodies(scenes.cattaneo(3, elements=6))
+    solution = solve(reduction.problem)
+    assert not at_rim(reduction, solution)
+    assert peak_pressure(reduction, solution) == pytest.approx(reduction.scene.reference.peak, rel=0.05)
+
+
+# Refinement
+
+
+def test_refinement_meets_the_target_from_coarse_to_fine():
+    scene = punch()
+    rough, first = refine([scene], "approach", 3e-2)
+    fine, second = refine([scene], "approach", 5e-3)
+    assert first.reached and second.reached and second.error <= 5e-3
+    assert fine.reduction.dofs > rough.reduction.dofs
+    assert fine.level in second.levels and fine.level.value == second.value
+    truth = refine([scene], "approach", 2e-3)[1].extrapolated
+    assert 0.5 < second.error / abs(second.value / truth - 1) < 4
+    assert abs(second.extrapolated / truth - 1) < abs(second.value / truth - 1) / 2
+
+
+def test_the_pressure_of_a_corner_is_refused_at_once():
+    solved, estimate = refine([punch()], "pressure", 1e-2)
+    assert not estimate.reached and estimate.error is None and "corner" in estimate.message
+    assert len(estimate.levels) == 1 and solved.solution.solved
+
+
+def test_a_quantity_that_does_not_converge_is_given_up(monkeypatch):
+    """The force density at the corner node grows like h^-1/2."""
+    monkeypatch.setitem(QUANTITIES, "corner", lambda reduction, s: (s.reactions[:, 0] / reduction.problem.areas).max())
+    _, estimate = refine([punch()], "corner", 1e-3)
+    assert not estimate.reached and "does not converge" in estimate.message and len(estimate.levels) < 7
+
+
+def test_a_limit_on_unknowns(monkeypatch):
+    monkeypatch.setitem(LARGEST, 2, 3000)
+    solved, estimate = refine([punch()], "energy", 1e-6)
+    assert not estimate.reached and "unknowns, more than 3,000" in estimate.message
+    assert solved.reduction.dofs <= 3000 and estimate.error > 1e-6
+
+
+def test_given_meshes_are_halved():
+    estimate = run(two_blocks("plane-strain"), accuracy=0.02, quantity="approach").estimate
+    assert [level.splits for level in estimate.levels] == list(range(len(estimate.levels)))
+    assert estimate.reached
+
+
+def test_given_meshes_of_solids_are_refused():
+    with pytest.raises(InputError, match="give the part a function"):
+        refine([two_blocks("solid")], "approach", 1e-9)
+
+
+def test_a_load_path_is_refined_as_a_whole():
+    result = run("cattaneo-2d", steps=1, elements=16, accuracy=0.05, quantity="energy")
+    assert result.path is not None and len(result.path.states) == 6
+    assert result.estimate.reached
+
+
+def test_units_do_not_matter():
+    mm = refine([punch()], "energy", 1e-2)[1]
+    metres = punch(
+        width=0.04, height=0.04, foundation_width=0.16, foundation_height=0.08, depth=0.04,
+        upper=Material(5e6, 0.3), lower=Material(5e6, 0.3),
+    )  # fmt: skip
+    m = refine([metres], "energy", 1e-2)[1]
+    assert m.value * 1e3 == pytest.approx(mm.value, rel=1e-8)
+    assert m.error == pytest.approx(mm.error, rel=1e-5)
+
+
+def test_command_line(tmp_path, capsys):
+    arguments = ["run", "punch-2d", "--out", str(tmp_path), "--accuracy", "0.02", "--quantity", "energy"]
+    assert cli.main(arguments) == 0
+    text = capsys.readouterr().out
+    assert "estimated relative error" in text and "below the target" in text
+    found = json.loads((tmp_path / "summary.json").read_text())["accuracy"]
+    assert found["reached"] and found["error"] <= 0.02
+    assert [level["elements"] for level in found["levels"]][:3] == [8, 16, 32]
+    assert cli.main([*arguments[:-1], "pressure"]) == 1
+    assert "corner" in capsys.readouterr().out
+    assert "NaN" not in (tmp_path / "summary.json").read_text()
+
+
+@pytest.mark.parametrize(
+    "changes,words",
+    [
+        ({"accuracy": 0.1}, "accuracy and quantity belong together"),
+        ({"quantity": "energy"}, "accuracy and quantity belong together"),
+        ({"accuracy": 0.1, "quantity": "noise"}, "choose from pressure, width, approach, stick, energy"),
+        ({"accuracy": 0.0, "quantity": "energy"}, "the accuracy must be a finite number"),
+    ],
+)
+def test_bad_input(changes, words):
+    with pytest.raises(InputError, match=words):
+        run("punch-2d", **changes)
+
+
+def test_a_scene_without_a_plate_has_no_approach():
+    base = two_blocks("plane-strain")
+    driven = replace(base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -0.1})))
+    with pytest.raises(InputError, match="no plate, hence no approach"):
+        run(replace(base, upper=driven), accuracy=0.1, quantity="approach")
