@@ -21,7 +21,7 @@ def coulomb_cone(r: np.ndarray, mu: np.ndarray) -> np.ndarray:
     """Nearest points of the cones |r_t| <= mu r_n: r (k, dim), mu (k,) >= 0."""
     n, t = split(r)
     length = np.linalg.norm(t, axis=1)
-    inside = length <= mu * n
+    inside = (length <= mu * n) & (n >= 0)  # without friction a tension is outside, too
     polar = mu * length <= -n  # nearest point is the apex
     height = np.where(inside, n, np.where(polar, 0.0, (n + mu * length) / (1 + mu**2)))
     out = np.empty_like(r)

@@ -82,50 +82,58 @@ def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
 def contact_trace(
     basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: tuple[float, bool]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, sp.csr_matrix]:
-    """Nodes (k,), areas (k,), outward unit normals (dim, k) and W (k, nodes of the body) of a contact boundary."""
-    mesh, name = basis.mesh, basis.mesh.refdom.__name__
-    shape, (face, hat, places, cells) = SHAPES[name][1][degree](), FACES[name]
+    """Contact nodes (k,), areas (k,), outward unit normals (dim, k) and W (k, nodes of the body) of a boundary."""
+    name = basis.mesh.refdom.__name__
+    shape, places, cells = SHAPES[name][1][degree](), FACES[name][2], FACES[name][3]
     if degree == 1:
-        cells = np.arange(cells.shape[1])[None]
+        cells = np.arange(cells.shape[1])[None]  # the whole face
         places = places[:, cells[0]]
-    points, share = get_quadrature(face, degree + 2)
-    phi = np.stack([hat.lbasis(points, v)[0] for v in range(cells.shape[1])])  # (v, point of a cell)
-    rule = np.concatenate([places[:, c] @ phi for c in cells], axis=1), np.tile(share / len(cells), len(cells))
-    fine = skfem.FacetBasis(mesh, shape, facets=boundary, quadrature=rule)
-    local, node = _nodes_on_faces(mesh, shape, boundary, places)
-    split = (len(boundary), len(cells), len(share))  # face, cell, point
-    N = np.stack([np.asarray(f[0]) for f in fine.basis], axis=1)
-    N = np.take_along_axis(N, local[:, :, None], axis=1).reshape(
-        len(boundary), -1, *split[1:]
-    )  # (face, j, cell, point)
-    flat = np.asarray(fine.dx).reshape(split)
-    measure = flat * np.broadcast_to(weight_at(weight, np.asarray(fine.global_coordinates())), fine.dx.shape).reshape(
-        split
-    )
+    phi, rule = _cell_rule(name, places, cells, degree)
+    at = skfem.FacetBasis(basis.mesh, shape, facets=boundary, quadrature=rule)
+    N, node = _face_shapes(at, shape, boundary, places)
+    split = (len(boundary), len(cells), phi.shape[1])  # face, cell, point
+    flat = np.asarray(at.dx)
+    measure = (flat * weight_at(weight, np.asarray(at.global_coordinates()))).reshape(split)
     area = np.einsum("vq,fcq->fcv", phi, measure)
     mass = np.einsum("vq,wq,fcq->fcvw", phi, phi, measure)
-    mixed = np.einsum("vq,fjcq,fcq->fcvj", phi, N, measure)
+    mixed = np.einsum("vq,fjcq,fcq->fcvj", phi, N.reshape(len(boundary), -1, *split[1:]), measure)
     dual = area[..., None] * np.linalg.solve(mass, mixed)  # int psi_v N_j of each cell
+    normal = np.einsum("vq,dfcq->dfcv", phi, (np.asarray(at.normals) * flat).reshape(-1, *split))
     nodes, rows = np.unique(node[:, cells], return_inverse=True)
     rows = rows.reshape(area.shape)
     areas = np.bincount(rows.ravel(), area.ravel())
-    normal = np.einsum("vq,dfcq,fcq->dfcv", phi, np.asarray(fine.normals).reshape(-1, *split), flat)
     normals = np.stack([np.bincount(rows.ravel(), n.ravel()) for n in normal])
     normals = normals / np.linalg.norm(normals, axis=0)
-    entries = np.broadcast_arrays(dual, rows[..., None], node[:, None, None, :])
-    value, row, column = (x.ravel() for x in entries)
-    W = sp.csr_matrix((value, (row, column)), (len(nodes), node_unknowns(basis).shape[1]))
-    W = sp.csr_matrix(sp.diags(1 / areas) @ W)
-    W.data = np.where(np.abs(W.data) < NOISE, 0.0, W.data)
+    value, row, column = np.broadcast_arrays(dual / areas[rows][..., None], rows[..., None], node[:, None, None, :])
+    size = len(nodes), node_unknowns(basis).shape[1]
+    W = sp.csr_matrix((value.ravel(), (row.ravel(), column.ravel())), size)
+    W.data = _clean(W.data)
     W.eliminate_zeros()
-    return nodes, areas, np.where(np.abs(normals) < NOISE, 0.0, normals), W  # exact axes stay exact
+    return nodes, areas, _clean(normals), W  # exact axes stay exact
 
 
-def _nodes_on_faces(
-    mesh: skfem.Mesh, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
+def _cell_rule(
+    name: str, places: np.ndarray, cells: np.ndarray, degree: int
+) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Hat functions (v, point) on a cell, and the quadrature rule of the reference face that is one rule per cell."""
+    face, hat = FACES[name][:2]
+    points, share = get_quadrature(face, degree + 2)
+    phi = np.stack([hat.lbasis(points, v)[0] for v in range(cells.shape[1])])
+    everywhere = np.concatenate([places[:, cell] @ phi for cell in cells], axis=1)
+    return phi, (everywhere, np.tile(share / len(cells), len(cells)))
+
+
+def _face_shapes(
+    at: skfem.FacetBasis, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of every facet (f, m): the shape function that is one at each of the places, and the node it belongs to."""
-    at = skfem.FacetBasis(mesh, shape, facets=boundary, quadrature=(places, np.ones(places.shape[1])))
-    local = np.argmax(np.stack([np.asarray(f[0]) for f in at.basis], axis=1), axis=1)
-    unknowns = np.take_along_axis(at.element_dofs.T, local, axis=1)
-    return local, np.argsort(node_unknowns(at)[0])[unknowns]
+    """Shape functions (face, j, point) of the nodes at the places of every face, and these nodes (face, j)."""
+    nodal = skfem.FacetBasis(at.mesh, shape, facets=boundary, quadrature=(places, np.ones(places.shape[1])))
+    local = np.argmax(np.stack([np.asarray(f[0]) for f in nodal.basis], axis=1), axis=1)  # the one that is 1 there
+    N = np.take_along_axis(np.stack([np.asarray(f[0]) for f in at.basis], axis=1), local[:, :, None], axis=1)
+    unknowns = np.take_along_axis(nodal.element_dofs.T, local, axis=1)
+    return N, np.argsort(node_unknowns(nodal)[0])[unknowns]
+
+
+def _clean(values: np.ndarray) -> np.ndarray:
+    """Rounding made zero."""
+    return np.where(np.abs(values) < NOISE, 0.0, values)

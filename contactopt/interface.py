@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from contactopt.body import Body
 from contactopt.errors import InputError
-from contactopt.scene import Rigid, Scene
+from contactopt.scene import Part, Rigid, Scene
 
 MATCH = 1e-6  # nodes match within this fraction of the shortest distance between contact nodes
 
@@ -20,7 +20,10 @@ def match_bodies(scene: Scene, upper: Body | None, lower: Body | None) -> tuple[
         own, other = _match(upper, lower)
         nodes = (upper.nodes[own], lower.nodes[other])
         normals = lower.normals[:, other]
-        apart = (upper.weights @ upper.locations.T)[own] - (lower.weights @ lower.locations.T)[other]
+        first, second = (
+            b.weights[:, b.surface] @ _true(p, b).T for p, b in zip((scene.upper, scene.lower), (upper, lower))
+        )
+        apart = first[own] - second[other]
         gap = np.sum(normals * apart.T, axis=0)
         areas = lower.areas[other]
     else:
@@ -32,18 +35,24 @@ def match_bodies(scene: Scene, upper: Body | None, lower: Body | None) -> tuple[
         if rigid.normal is not None:
             normals = np.tile(np.array(rigid.normal)[:, None] / np.linalg.norm(rigid.normal), len(own))
         areas = body.areas[own]
-        gap = _rigid_gap(body, rigid)[own]
+        gap = _rigid_gap(scene.upper if upper is not None else scene.lower, body, rigid)[own]
     return nodes, _frames(normals), gap, areas
 
 
-def _rigid_gap(body: Body, rigid: Rigid) -> np.ndarray:
+def _rigid_gap(part: Part | Rigid, body: Body, rigid: Rigid) -> np.ndarray:
     """Initial gap (k,) between a body and a rigid one: what the gaps of the nodes contribute, as their displacements."""
     if rigid.gap is None:
         return np.zeros(len(body.nodes))
-    gap = np.asarray(rigid.gap(body.locations[:, body.surface]), dtype=float)
+    gap = np.asarray(rigid.gap(_true(part, body)), dtype=float)
     if gap.shape != body.surface.shape or not np.all(np.isfinite(gap)):
         raise InputError(f"the gap of rigid body '{rigid.name}' must give one finite number per contact node.")
     return np.asarray(body.weights[:, body.surface] @ gap)
+
+
+def _true(part: Part | Rigid, body: Body) -> np.ndarray:
+    """Where the nodes of the contact boundary lie on the surface that the mesh stands for, (dim, m)."""
+    places = body.locations[:, body.surface]
+    return places if isinstance(part, Rigid) or part.curve is None else np.asarray(part.curve(places), dtype=float)
 
 
 def _match(upper: Body, lower: Body) -> tuple[np.ndarray, np.ndarray]:

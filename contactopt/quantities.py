@@ -62,7 +62,7 @@ def peak_pressure(reduction: Reduction, solution: Solution) -> float:
     near = distance < WINDOW * edge
     if at_rim(reduction, solution) or len(np.unique(distance[near])) < 3:
         return float(pressure[top])
-    degree = 4 if near.sum() >= 2 * 5 ** len(x) else 2
+    degree = 4 if near.sum() >= 5 ** len(x) + 2 else 2
     powers = np.stack(np.meshgrid(*[np.arange(degree + 1)] * len(x), indexing="ij")).reshape(len(x), -1)
     powers = powers[:, powers.sum(axis=0) <= degree]
     local = (x[:, near] - middle[:, None]) / (WINDOW * edge)
@@ -107,8 +107,8 @@ def _surface(scene: Scene, problem: InterfaceProblem) -> tuple[np.ndarray, np.nd
 def width(reduction: Reduction, solution: Solution) -> float:
     """Half-width of the contact zone [length].
 
-    In the plane, where contact ends by itself: the zero of a line through p^2 against x^2, from half of the half-width to the last
-    node but one, whose values carry the error of the edge. Otherwise contact_edge().
+    In the plane, where contact ends by itself: the zero of a line through p^2 against x^2, from half of the half-width on, without
+    the last two nodes, whose values carry the error of the edge. Otherwise contact_edge().
     """
     from contactopt.edges import contact_edge
     from contactopt.zone import pressed
@@ -117,7 +117,8 @@ def width(reduction: Reduction, solution: Solution) -> float:
     inside, distance = pressed(r), np.abs(problem.coordinates[0])
     if problem.dim == 2 and inside.any() and not inside.all() and distance[~inside].min() > distance[inside].max():
         last = distance[inside].max()
-        fitted = inside & (distance >= WINDOW * last) & (distance < last)
+        rough = np.sort(distance[inside])[-2:].min()
+        fitted = inside & (distance >= WINDOW * last) & (distance < rough)
         if len(np.unique(distance[fitted])) > 2:
             square = (r[fitted, 0] / problem.areas[fitted]) ** 2
             slope, height = np.polyfit(distance[fitted] ** 2, square, 1, w=np.sqrt(problem.areas[fitted]))

@@ -94,6 +94,8 @@ class Part:
     mesh     a scikit-fem mesh with named boundaries, or a function (elements, zone) -> mesh, where `elements`
              counts elements across the contact half-width and `zone` is the half-width the mesh must resolve.
     contact  the name of the candidate contact boundary.
+    curve    function (dim, k) -> (dim, k) that puts points of the contact boundary on the surface that the mesh stands
+             for: the gap of a curved body at nodes within its edges (degree 2). None: the edges are the surface.
     """
 
     name: str
@@ -102,6 +104,7 @@ class Part:
     supports: tuple[Support, ...] = ()
     loads: tuple[Traction | BodyForce | Plate, ...] = ()
     contact: str = "contact"
+    curve: Callable[[np.ndarray], np.ndarray] | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.material, Material):

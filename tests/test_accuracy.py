@@ -22,7 +22,7 @@ def punch(**changes):
 # The estimate
 
 
-@pytest.mark.parametrize("order", [0.5, 1.0, 1.7, 2.0])
+@pytest.mark.parametrize("order", [0.8, 1.0, 1.7, 2.0])
 def test_the_remainder_of_a_power_of_the_mesh_size_is_exact(order):
     values = 3 + 0.1 * 2.0 ** (-order * np.arange(3))
     rest, found = remainder(*np.diff(values), 2)
@@ -32,7 +32,7 @@ def test_the_remainder_of_a_power_of_the_mesh_size_is_exact(order):
 
 def test_the_remainder_does_not_trust_luck():
     assert remainder(1.0, 1e-6, 2)[0] == pytest.approx(1 / 12)  # what second order leaves of the difference before
-    assert remainder(1.0, 0.9, 2)[0] == pytest.approx(0.9 / (np.sqrt(2) - 1))  # no slower than order 1/2
+    assert remainder(1.0, 0.9, 2)[0] == pytest.approx(0.9 / (2**0.75 - 1))  # no slower than order 3/4
     rest, order = remainder(1.0, -0.1, 2)
     assert rest == pytest.approx(-0.25) and order is None
     assert remainder(None, 0.3, 2) == (pytest.approx(0.1), None)

@@ -20,6 +20,11 @@ def test_coulomb_cone_projection_is_characterised_by_moreau(points, mu):
     assert np.allclose(np.sum(p * rest, axis=1), 0, atol=20 * tol)
 
 
+def test_without_friction_only_pressure_is_left():
+    points = np.array([[-1.0, 0.0], [-1.0, 2.0], [0.0, -1.0], [3.0, 1.0]])
+    assert np.array_equal(coulomb_cone(points, np.zeros(4)), [[0, 0], [0, 0], [0, 0], [3, 0]])
+
+
 def test_disc_of_radius_zero_and_one_dimension():
     assert np.array_equal(disc(np.array([[3.0, 4.0]]), np.array([0.0])), [[0.0, 0.0]])
     assert np.array_equal(disc(np.array([[-3.0], [0.5]]), np.array([1.0, 1.0])), [[-1.0], [0.5]])

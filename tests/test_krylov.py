@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, reduce_bodies, run, scenes, solve
+from contactopt.alart_curnier import coulomb_equations
 from contactopt.krylov import krylov_step, model_of
 from contactopt.linear import SuperLUSolver
-from contactopt.methods.newton import coulomb_equations
 from contactopt.operators import InterfaceOperator, block, estimate_diagonal, nodal_weights
 from contactopt.problem import dimensionless
 from contactopt.reduction import form_of
@@ -157,7 +157,9 @@ def test_auto_falls_back_on_the_entries_of_Q():
 
 def test_the_form_is_chosen_by_cost():
     assert form_of(200, 4000, 2, False) == form_of(900, 20_000, 3, False) == "explicit"
-    assert form_of(2050, 80_000, 2, False) == form_of(9000, 20_000, 3, False) == form_of(200, 4000, 2, True) == "implicit"
+    assert (
+        form_of(2050, 80_000, 2, False) == form_of(9000, 20_000, 3, False) == form_of(200, 4000, 2, True) == "implicit"
+    )
     for dim in (2, 3):  # more interface on the same body never makes an explicit Q cheaper
         chosen = [form_of(m, 30_000, dim, False) for m in (10, 100, 1000, 3000, 9000)]
         assert chosen == sorted(chosen) and len(set(chosen)) == 2

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve, transfer
+from contactopt.alart_curnier import coulomb_equations
 from contactopt.bonded import Bonded
 from contactopt.cones import coulomb_map
 from contactopt.methods.auto import Auto
-from contactopt.methods.newton import coulomb_equations
 from contactopt.problem import dimensionless
 from contactopt.scenes import make_scene
 from contactopt.semismooth import Equations

@@ -81,7 +81,7 @@ def scene(name: str, **parameters: Any) -> Scene:
         raise InputError(f"scene '{name}' has a rigid body; give its deformable material as arguments of the scene.")
     if "stiffness_ratio" in given and "lower_E" in given:
         raise InputError("give stiffness_ratio or lower_E, not both.")
-    new = {}
+    new: dict[str, Any] = {}
     for body, part in bodies.items():
         changes = {key.partition("_")[2]: v for key, v in given.items() if key.startswith(body)}
         new[body] = replace(part.material, **changes)  # type: ignore[union-attr]

@@ -22,9 +22,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactopt.alart_curnier import cold_start
 from contactopt.balance import cylinder_derivative, project_balanced
 from contactopt.methods import NATIVE, Iterate
-from contactopt.methods.newton import cold_start
 from contactopt.methods.proximal import proximal_step
 from contactopt.mprgp import MARGIN, largest_eigenvalue
 from contactopt.problem import InterfaceProblem

@@ -20,11 +20,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from contactopt.alart_curnier import cold_start, coulomb_equations
 from contactopt.cones import coulomb_cone
 from contactopt.errors import BackendError
 from contactopt.methods import NATIVE, Iterate
 from contactopt.methods.cone import AcaryCadoux
-from contactopt.methods.newton import Newton, cold_start, coulomb_equations
+from contactopt.methods.newton import Newton
 from contactopt.methods.proximal import Proximal
 from contactopt.preconditioners import find_preconditioner
 from contactopt.problem import InterfaceProblem

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactopt.alart_curnier import cold_start, coulomb_equations
 from contactopt.methods import NATIVE, Iterate
-from contactopt.methods.newton import cold_start, coulomb_equations
 from contactopt.problem import InterfaceProblem
 
 INNER = 15  # Newton steps in one proximal subproblem

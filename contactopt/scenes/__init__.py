@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from contactopt.errors import InputError
 from contactopt.scene import Scene
+from contactopt.scenes.common import with_elements
 from contactopt.scenes.flat import flat_punch, rigid_punch
 from contactopt.scenes.round import cylinder, growing_indentation, indentation, sphere
 from contactopt.scenes.sliding import cattaneo, shear_cycle
@@ -52,18 +53,24 @@ PATHS: dict[str, Callable[..., tuple[Scene, ...]]] = {
 }
 
 
-def make_scene(name: str, **changes: object) -> Scene:
-    """The named scene with some of its arguments changed; InputError for an unknown name or argument."""
+def make_scene(name: str, *, degree: int = 1, simplices: bool = False, **changes: object) -> Scene:
+    """The named scene with some of its arguments changed; InputError for an unknown name or argument.
+
+    degree     of the displacement, 1 or 2;  simplices  triangles or tetrahedra instead of quadrilaterals or hexahedra
+    """
     if name not in SCENES:
         raise InputError(f"unknown scene {name!r}; choose from {', '.join(SCENES)}.")
-    return _made(name, SCENES[name][0], changes)
+    return with_elements(_made(name, SCENES[name][0], changes), degree, simplices)
 
 
-def make_path(name: str, **changes: object) -> tuple[Scene, ...]:
-    """The load path of a named scene, its arguments and those of its states changed; InputError if it has none."""
+def make_path(name: str, *, degree: int = 1, simplices: bool = False, **changes: object) -> tuple[Scene, ...]:
+    """The load path of a named scene, its arguments and those of its states changed; InputError if it has none.
+
+    degree, simplices  as in make_scene
+    """
     if name not in PATHS:
         raise InputError(f"scene {name!r} has no load path; choose from {', '.join(PATHS)}.")
-    return _made(name, PATHS[name], changes)
+    return tuple(with_elements(scene, degree, simplices) for scene in _made(name, PATHS[name], changes))
 
 
 def _made(name: str, make: Callable, changes: dict[str, object]):  # type: ignore[no-untyped-def]

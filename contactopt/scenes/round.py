@@ -188,10 +188,13 @@ def _round_bodies(
     def gap(x: np.ndarray) -> np.ndarray:
         return radius - np.sqrt(radius**2 - np.minimum(x[0], radius) ** 2)
 
+    def arc(x: np.ndarray) -> np.ndarray:
+        return np.stack([x[0], gap(x)])
+
     axis, load = Support("axis", {axes[0]: 0.0}), {axes[1]: -force}
     top: Part | Rigid = Rigid(name, gap=gap, force=load)
     if rigid != name:
-        top = Part(name, upper_mesh, upper, (axis,), (Plate("top", load),))
+        top = Part(name, upper_mesh, upper, (axis,), (Plate("top", load),), curve=arc)
     bottom: Part | Rigid = Rigid("foundation", normal=(0.0, 1.0), gap=lambda x: x[1])
     if rigid != "foundation":
         bottom = Part("foundation", lower_mesh, lower, (axis, Support("bottom")))

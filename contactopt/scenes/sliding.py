@@ -101,10 +101,14 @@ def cattaneo(
         return body.morphed(*[None] * (dim - 1), raised) if sign > 0 else body
 
     symmetry = (Support("symmetry", {"y": 0.0}),) if dim == 3 else ()
+
+    def paraboloid(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([x[:-1], np.sum(x[:-1] ** 2, axis=0, keepdims=True) / (2 * radius)])
+
     plate = Plate("far", {"x": shear, up: -force})
     return Scene(
         f"cattaneo-{dim}d",
-        Part("upper", lambda elements, zone: mesh(elements, 1.0), material, symmetry, (plate,)),
+        Part("upper", lambda elements, zone: mesh(elements, 1.0), material, symmetry, (plate,), curve=paraboloid),
         Part("lower", lambda elements, zone: mesh(elements, -1.0), material, (*symmetry, Support("far"))),
         mu,
         kind="plane-strain" if dim == 2 else "solid",

@@ -30,7 +30,7 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
         f"claim more than the certificate confirms ({', '.join(sorted(liars.index)) or 'none'}). At default settings the median "
         f"residual over all backends is {default['residual'].median():.0e}.",
         f"A crossover mends it: with active-set steps {100 * exact['success'].mean():.0f} % of {len(exact)} runs keep the "
-        f"tolerance, median residual {exact['residual'].median():.0e}, for {100 * (cost.median() - 1):+.0f} % time (median over "
+        f"tolerance, median residual {exact['residual'].median():.0e}, for {100 * (cost.median() - 1):+.0f} % CPU time (median over "
         "sizes, all backends together).",
         f"At 1e-6 the least shifted geometric mean CPU time is that of `{fastest['method']}` "
         f"({1e3 * fastest['shifted mean']:.2g} ms); "

@@ -1,0 +1,249 @@
+"""Shape and degree of the elements: patch test, weights of the contact surface, exactness, no ripple in Hertz."""
+
+from dataclasses import replace
+
+import meshio
+import numpy as np
+import pytest
+import skfem
+from conftest import MATERIAL, block, two_blocks
+from scipy.sparse.linalg import spsolve
+from skfem.helpers import ddot, sym_grad, trace
+
+from contactopt import (
+    BodyForce,
+    InputError,
+    Material,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    reduce_bodies,
+    run,
+    scenes,
+    solve,
+)
+from contactopt.body import build_body, lame
+from contactopt.elements import FACES, weight_at
+from contactopt.mesh import rename, simplices, tensor_mesh
+from contactopt.recover import recover
+from contactopt.scenes.common import with_elements
+from experiments import elements as experiment
+
+KINDS = ["plane-strain", "axisymmetric", "solid"]
+AREA = {"plane-strain": 1.0, "axisymmetric": np.pi, "solid": 1.0}
+SHAPES = [(kind, degree, cut) for kind in KINDS for degree in (1, 2) for cut in (False, True)]
+
+
+def body_of(kind: str, degree: int, cut: bool, **part):
+    scene = with_elements(two_blocks(kind), degree, cut)
+    return build_body(scene, replace(scene.lower, **part), 1, None)
+
+
+@pytest.mark.parametrize("kind,degree,cut", SHAPES)
+def test_patch_test_uniform_pressure_is_exact(kind, degree, cut):
+    scene = with_elements(two_blocks(kind, force=3.0), degree, cut)
+    reduction = reduce_bodies(scene)
+    problem, solution = reduction.problem, solve(reduction.problem, tol=1e-12)
+    pressure = 3.0 / AREA[kind]
+    assert np.all(problem.areas > 0) and np.all(solution.reactions[:, 0] >= 0)
+    assert np.abs(solution.reactions[:, 0] / problem.areas / pressure - 1).max() < 1e-10
+    modulus = 5 / (1 - 0.3**2) if kind == "plane-strain" else 5
+    assert -solution.multipliers[0] == pytest.approx(3 * pressure / modulus, rel=1e-10)
+    for field in recover(reduction, solution):
+        axial = field.stress[:, 2 if kind == "solid" else 1]
+        assert np.abs(axial / pressure + 1).max() < 1e-10
+
+
+@pytest.mark.parametrize("kind,degree,cut", SHAPES)
+def test_stiffness_is_the_weak_form_of_elasticity(kind, degree, cut):
+    """Against scikit-fem's own assembly, on a quadrature of its own that is exact but for 1/r."""
+    body = body_of(kind, degree, cut)
+    lam, shear = lame(MATERIAL)
+
+    @skfem.BilinearForm
+    def elasticity(u, v, w):
+        volume, volume_v, energy = trace(sym_grad(u)), trace(sym_grad(v)), ddot(sym_grad(u), sym_grad(v))
+        if kind == "axisymmetric":
+            volume, volume_v = volume + u[0] / w.x[0], volume_v + v[0] / w.x[0]
+            energy = energy + u[0] * v[0] / w.x[0] ** 2
+        return (lam * volume * volume_v + 2 * shear * energy) * weight_at(body.weight, w.x)
+
+    fine = skfem.Basis(body.basis.mesh, body.basis.elem, intorder=6)
+    same = kind == "axisymmetric"  # 1/r: no rule is exact
+    expected = elasticity.assemble(body.basis if same else fine)
+    assert abs(body.A - expected).max() <= 1e-12 * abs(expected).max()
+
+
+@pytest.mark.parametrize("kind,degree,cut", SHAPES)
+def test_weights_pass_on_force_and_its_moment(kind, degree, cut):
+    """Rows of W add up to 1; A' W is the force of unit pressure on every node; linear displacements keep their place."""
+    body = body_of(kind, degree, cut)
+    W = body.weights
+    assert np.allclose(W.sum(axis=1), 1, atol=1e-12)
+    up = (0.0,) * (len(body.unknowns) - 1) + (1.0,)
+    scene = with_elements(two_blocks(kind), degree, cut)
+    loaded = build_body(scene, replace(scene.lower, loads=(Traction("top", up),)), 1, None)
+    assert np.allclose(body.areas @ W, loaded.load[body.unknowns[-1]], atol=1e-13 * body.areas.sum())
+    if degree == 1:
+        assert np.array_equal(body.nodes, W.indices) and np.allclose(W.data, 1)
+    mean = W @ body.locations.T
+    assert np.abs(mean - body.points.T)[:, -1].max() < 1e-12  # on the plane of contact
+
+
+@pytest.mark.parametrize("cut", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_quadratic_displacement_has_no_error(kind, cut):
+    """A clamped-free bar under its own weight: the displacement is quadratic, the reaction is its weight."""
+    scene = with_elements(two_blocks(kind), 2, cut)
+    up = scene.components[-1]
+    sides = tuple(s for s in scene.lower.supports if s.boundary != "bottom")
+    weight = BodyForce((0.0,) * (scene.dim - 1) + (-2.0,))
+    part = replace(scene.lower, supports=(*sides, Support("bottom", {up: 0.0})), loads=(weight,), material=MATERIAL)
+    part = replace(part, material=Material(5.0, 0.0))
+    body = build_body(scene, part, 1, None)
+    U = np.zeros(body.basis.N)
+    U[body.free] = spsolve(body.A[body.free][:, body.free].tocsc(), body.load[body.free])
+    z = body.locations[-1] + 2  # height above the support; length 2
+    assert np.allclose(U[body.unknowns[-1]], -2 / 5 * (2 * z - z**2 / 2), atol=1e-12)
+    assert np.allclose(U[body.unknowns[0]], 0, atol=1e-12)
+
+
+def test_rigid_motions_of_curved_elements_cost_nothing():
+    mesh = skfem.MeshQuad2.from_mesh(skfem.MeshQuad().refined(2))
+    mesh.doflocs[1] += 0.1 * mesh.doflocs[0] ** 2
+    mesh = mesh.with_boundaries({"contact": lambda x: x[0] == 0, "far": lambda x: x[0] == 1})
+    part = Part("b", mesh, MATERIAL, (Support("far"),))
+    for degree, nodes in ((1, 25), (2, 81)):
+        body = build_body(Scene("s", part, Rigid("r"), 0.0, degree=degree), part, 1, None)
+        turn = np.zeros(body.basis.N)
+        turn[body.unknowns[0]], turn[body.unknowns[1]] = -body.locations[1], body.locations[0]
+        assert body.unknowns.shape[1] == nodes
+        assert np.abs(body.A @ turn).max() < 1e-12 * abs(body.A).max()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_cutting_into_simplices_keeps_volume_and_boundaries(kind):
+    mesh = block(kind, -2, 0)
+    cut = simplices(mesh)
+    assert cut.nelements == mesh.nelements * (6 if kind == "solid" else 2)
+    assert set(cut.boundaries) == set(mesh.boundaries)
+    for name in mesh.boundaries:
+        shapes = (
+            (skfem.ElementHex1, skfem.ElementTetP1) if kind == "solid" else (skfem.ElementQuad1, skfem.ElementTriP1)
+        )
+        areas = [
+            float(np.sum(skfem.FacetBasis(m, e(), facets=m.boundaries[name]).dx)) for m, e in zip((mesh, cut), shapes)
+        ]
+        assert areas[0] == pytest.approx(areas[1])
+
+
+def test_cells_that_cannot_be_cut_alike_are_refused():
+    mesh = skfem.MeshHex.init_tensor(np.linspace(0, 1, 3), np.linspace(0, 1, 2), np.linspace(0, 1, 2))
+    t = mesh.t.copy()
+    t[:, 0] = t[[1, 4, 5, 0, 7, 2, 3, 6], 0]  # the first cell turned by a quarter
+    assert skfem.MeshHex(mesh.p, t).is_valid()
+    with pytest.raises(InputError, match="different orders"):
+        simplices(skfem.MeshHex(mesh.p, t))
+
+
+@pytest.mark.parametrize("degree", [0, 3, 1.5, "2"])
+def test_other_degrees_are_refused(degree):
+    with pytest.raises(InputError, match="degree of the displacement must be 1 or 2"):
+        scenes.make_scene("punch-2d", degree=degree)
+
+
+def test_a_half_model_is_half_of_the_whole():
+    """On the plane of symmetry the tangential component at degree 2 belongs to the support, as its mirror image asks."""
+    x = np.array([0.0, 0.3, 0.7, 1.0])
+    whole, half = (tensor_mesh(grid, np.linspace(0, 1, 4)) for grid in (np.concatenate([-x[:0:-1], x]), x))
+    both = []
+    for mesh, copies in ((whole, 1), (half, 2)):
+        mesh = rename(mesh, contact="y-", top="y+")
+        hold = (Support("x-", {"x": 0.0}),) if copies == 2 else ()
+        plate = Plate("top", {"y": -1.0})
+        part = Part("b", mesh, MATERIAL, hold, (plate,))
+        scene = Scene("s", part, Rigid("floor"), 0.2, degree=2, copies=copies)
+        reduction = reduce_bodies(scene)
+        both.append((reduction.problem, solve(reduction.problem, tol=1e-12)))
+    (a, first), (b, second) = both
+    right = np.flatnonzero(a.coordinates[0] > 1e-12)
+    right = right[np.argsort(a.coordinates[0, right])]
+    own = np.flatnonzero(b.coordinates[0] > 1e-12)
+    own = own[np.argsort(b.coordinates[0, own])]
+    assert np.allclose(2 * first.reactions[right], second.reactions[own], atol=1e-9)
+    assert first.multipliers[0] == pytest.approx(second.multipliers[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_hertz_does_not_ripple_in_3d(cut):
+    """Within .6 a the error of the pressure is nearly the same at all nodes; contacts at all nodes of P2 would fail."""
+    row = experiment.measure("sphere 3D", 2, 2, "P" if cut else "Q")
+    assert row["ripple"] < 0.03
+    if cut:
+        with experiment.contacts_at_all_nodes():
+            assert experiment.measure("sphere 3D", 2, 2, "P")["ripple"] > 2 * row["ripple"]
+        assert len(FACES["RefTet"][3]) == 1
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_quadratic_elements_need_fewer_unknowns_for_hertz(cut):
+    """Peak pressure and approach: closer on a quadratic mesh half as fine, of about as many unknowns."""
+    shape = "P" if cut else "Q"
+    linear, quadratic = experiment.measure("sphere", 8, 1, shape), experiment.measure("sphere", 4, 2, shape)
+    assert quadratic["unknowns"] < 1.3 * linear["unknowns"]
+    for quantity in ("peak", "approach"):
+        assert abs(quadratic[quantity]) < 0.9 * abs(linear[quantity])
+
+
+def test_the_gap_of_a_curved_body_does_not_alternate():
+    """Edges are straight, the sphere is not: Part.curve knows. Without it the middles of edges would touch too late."""
+    scene = scenes.make_scene("sphere", degree=2, elements=8, mu=0.0)
+    a = scene.reference.half_width
+    ripple = []
+    for made in (scene, replace(scene, upper=replace(scene.upper, curve=None))):
+        problem = reduce_bodies(made, zone=a).problem
+        pressure = solve(problem).reactions[:, 0] / problem.areas / scene.reference.peak
+        order = np.argsort(problem.coordinates[0])
+        ripple.append(np.abs(np.diff(pressure[order][:8], 3)).max())
+    assert ripple[0] < 0.01 < 0.1 < ripple[1]
+
+
+@pytest.mark.parametrize("name,elements", [("punch-2d", 6), ("sphere", 6), ("punch-3d", 2)])
+@pytest.mark.parametrize("cut", [False, True])
+def test_scenes_run_with_quadratic_elements(name, elements, cut, tmp_path):
+    result = run(name, tmp_path, elements=elements, degree=2, simplices=cut)
+    assert result.summary["status"] == "solved"
+    assert result.summary["normal_force"] == pytest.approx(100)
+    for field in result.fields:
+        back = meshio.read(tmp_path / f"{field.name}.vtu")
+        assert len(back.points) == field.displacement.shape[1] == len(field.stress)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_stress_below_hertz_contact(degree):
+    """On the axis sigma_z = -p0 / (1 + z^2/a^2): at the surface too where the displacement is quadratic."""
+    scene = scenes.make_scene("sphere", degree=degree, elements=32 // degree**2, mu=0.0)
+    a, p0 = scene.reference.half_width, scene.reference.peak
+    reduction = reduce_bodies(scene, zone=a)
+    foundation = recover(reduction, solve(reduction.problem))[1]
+    r, z = foundation.mesh.p
+    axis = (r == 0) & (z > -3 * a)
+    vertical = foundation.stress[axis, foundation.names.index("zz")]
+    error = np.abs(vertical + p0 / (1 + (z[axis] / a) ** 2))
+    assert error[np.abs(z[axis]) > (0.1 * a if degree == 1 else -1)].max() < 0.02 * p0
+
+
+@pytest.mark.parametrize("solver", ["superlu", "multigrid"])
+@pytest.mark.parametrize("cut", [False, True])
+def test_quadratic_bodies_by_products(solver, cut):
+    """Q as an operator, bodies solved by factors or multigrid, against the explicit one."""
+    if solver == "multigrid":
+        pytest.importorskip("pyamg")
+    scene = scenes.make_scene("punch-3d", elements=2, degree=2, simplices=cut)
+    explicit = reduce_bodies(scene, Q="explicit").problem
+    implicit = reduce_bodies(scene, Q="implicit", solver=solver).problem
+    r = np.random.default_rng(0).standard_normal(explicit.q.size)
+    assert np.abs(implicit.Q @ r - explicit.Q @ r).max() < 1e-7 * np.abs(explicit.Q @ r).max()
