@@ -7,8 +7,8 @@ whatever size the mesh function holds fixed. The error is taken as one part that
 
     J(elements, splits) - J = A elements^-p + B 2^(-p' splits),
 
-both read from differences of nested solutions (Richardson), the second on coarse meshes, where it costs little; their sizes
-are added, the larger part is refined next. Orders are observed where there are three solutions, and held between 3/4 and 2 per degree of the displacement,
+both read from differences of nested solutions (Richardson): the first of the meshes for n, 2 n, 4 n elements, the second of the last
+of them and its split, measured anew on the mesh that it asks to split. Their sizes are added, the larger part is refined next. Orders are observed where there are three solutions, and held between 3/4 and 2 per degree of the displacement,
 the order of functionals of smooth solutions. Not estimated, because no refinement shows it: what finite bodies differ
 from half-spaces, and the steps of a load path.
 
@@ -163,7 +163,7 @@ class _Search:
 
     meshes   levels of the main sequence: doubled elements without splits, or, where the meshes are given, splits alone
     changes  of the value by the first split, the second, ...: those of the present splits, and at least one
-    share    by which the first split multiplies the unknowns, on a coarse mesh: an upper bound for finer ones
+    share    by which the first split multiplies the unknowns
     """
 
     def __init__(self, states, quantity, note, forms, settings):  # type: ignore[no-untyped-def]
@@ -182,7 +182,7 @@ class _Search:
         while len(self.meshes) < 3 and not self.obstacle() and not self.finer_mesh():
             pass
         if scene.dim == 2 and not self.given and len(self.meshes) > 1:
-            self._split()
+            self._split(1, self.meshes[-1].elements)
 
     def mesh_error(self) -> tuple[float, float | None]:
         """Of the value on the last mesh, signed [unit of the quantity], and its order; infinite for a single mesh."""
@@ -223,11 +223,13 @@ class _Search:
 
     def finer_grading(self) -> str:
         """One split more; or the reason not to."""
+        elements = self.meshes[-1].elements
+        if 2 ** (self.splits + 1) * self.first > elements:  # would start from a mesh coarser than the first
+            return self.finer_mesh()
         if reason := self._too_large(1.0, self.splits + 1):
             return reason
         self.splits += 1
-        if self.splits > len(self.changes):
-            self._split()
+        self._split(self.splits, elements)
         return ""
 
     def final(self) -> Solved:
@@ -252,17 +254,15 @@ class _Search:
         self.last = self._solve(self.first if self.given else self.first * 2**i, i if self.given else 0)
         self.meshes.append(self.last.level)
 
-    def _split(self) -> None:
-        """Measure the change by the next split, on meshes made of the first one."""
-        splits = len(self.changes) + 1
-        elements = self.first * 2**splits
+    def _split(self, splits: int, elements: int) -> None:
+        """Measure the change by a split."""
         known = {(level.elements, level.splits): level.value for level in self.levels}
         if (elements, splits - 1) not in known:
             known[elements, splits - 1] = self._solve(elements, splits - 1).level.value
         self.split_last = self._solve(elements, splits)
-        if splits == 1:
-            self.share = self.split_last.level.unknowns / self.meshes[1].unknowns
-        self.changes.append(self.split_last.level.value - known[elements, splits - 1])
+        if not self.changes:
+            self.share = self.split_last.level.unknowns / self.meshes[-1].unknowns
+        self.changes[splits - 1 :] = [self.split_last.level.value - known[elements, splits - 1]]
 
     def _solve(self, elements: int, splits: int) -> Solved:
         self.note(f"{elements} elements across the half-width" + (f", {splits} splits" if splits else ""))

@@ -94,11 +94,11 @@ def patch(mesh: MeshQuad | MeshHex, boundary: str, name: str, limits: list[float
 def simplices(mesh: MeshQuad | MeshHex) -> MeshTri | MeshTet:
     """Every quadrilateral cut into two triangles, every hexahedron into six tetrahedra; boundaries keep their names.
 
-    Bodies cut from meshes with the same cells on their contact faces match there, since all cells are cut the same way.
-    Raises InputError if neighbours are cut differently: number the vertices of all cells in the same order.
+    Edges become straight. Bodies cut from meshes with the same cells on their contact faces match there, since all cells
+    are cut the same way. Raises InputError if neighbours are cut differently: number the vertices of all cells in the same order.
     """
-    cut = mesh.to_meshtri() if isinstance(mesh, MeshQuad) else MeshHex.to_meshtet(mesh)
-    cut = type(cut)(cut.p, cut.t)
+    vertices = mesh.p[:, : mesh.nvertices]
+    cut = MeshQuad(vertices, mesh.t).to_meshtri() if len(vertices) == 2 else MeshHex(vertices, mesh.t).to_meshtet()
     facets = cut.boundary_facets()
     if len(facets) != (len(mesh.p) - 1) * len(mesh.boundary_facets()):
         raise InputError("the mesh cannot be cut into simplices: its cells number their vertices in different orders.")

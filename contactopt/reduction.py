@@ -191,12 +191,14 @@ def _operator(
     """Q = sum T (C + soft soft') T' by its products."""
     pairs = list(zip(bodies, maps))
 
+    threads = not any(body is not None and body.solver.name == "superlu" for body in bodies)  # it keeps Python's lock
+
     def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
         def moved(pair: tuple[ReducedBody | None, sp.csr_matrix | None]) -> np.ndarray | float:
             body, T = pair
             return 0.0 if body is None or T is None else T @ body.contact_motion(T.T @ X, accuracy)
 
-        first, second = both(moved, pairs)
+        first, second = both(moved, pairs) if threads else map(moved, pairs)
         return np.asarray(first + second)
 
     def entries() -> np.ndarray:

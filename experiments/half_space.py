@@ -1,8 +1,8 @@
 """Rigid indenters on a half-space, on families of meshes all of whose elements shrink as `elements` grows.
 
-Elements of a / n next to the contact grow outwards by the ratio 1 + min(SLOPE / n (1 + r / a)^POWER, FASTEST) of neighbours: slowly
+Elements of a / n next to the contact grow outwards by the ratio exp(SLOPE / n min(1 + r / a, FAR)^POWER) of neighbours: slowly
 where the field of the contact still varies, faster where it has faded. The number of elements across a body of size L
-then hardly depends on L, and doubling n halves h / r everywhere, so that no part of the error stays behind.
+then hardly depends on L, and doubling n halves every element, so that no part of the error stays behind.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from contactopt.analytic import (
 from contactopt.mesh import patch, rename, tensor_mesh
 from contactopt.scene import Material, Part, Rigid, Scene, Support
 
-SLOPE, POWER, FASTEST = 3.2, 0.3, 0.7
+SLOPE, POWER, FAR = 2.8, 0.3, 100.0
 MATERIAL = Material(5.0, 0.3)
 MARGIN = 1.25  # candidates of contact beyond the zone
 CORNER = 2.0  # exponent of the grading towards the edge of a flat punch
@@ -31,7 +31,7 @@ def outwards(start: float, first: float, slope: float, size: float) -> np.ndarra
     grid, h = [start], first
     while grid[-1] < size:
         grid.append(grid[-1] + h)
-        h *= 1 + min(slope * (1 + grid[-1]) ** POWER, FASTEST)
+        h *= np.exp(slope * min(1 + grid[-1], FAR) ** POWER)
     offsets = np.array(grid) - start
     return np.asarray(start + offsets * ((size - start) / offsets[-1]))
 

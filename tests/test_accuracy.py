@@ -12,6 +12,9 @@ from contactopt.quantities import QUANTITIES, at_rim, peak_pressure
 from contactopt.reduction import reduce_bodies
 from contactopt.refinement import split
 from contactopt.scene import Material, Support
+from contactopt.zone import solve_zone
+from experiments.accuracy import effectivity, exact
+from experiments.half_space import flat, indenter
 
 
 def punch(**changes):
@@ -198,3 +201,39 @@ def test_a_scene_without_a_plate_has_no_approach():
     driven = replace(base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -0.1})))
     with pytest.raises(InputError, match="no plate, hence no approach"):
         run(replace(base, upper=driven), accuracy=0.1, quantity="approach")
+
+
+# Against exact solutions
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", [1e-2, 3e-3])
+@pytest.mark.parametrize("quantity", ["pressure", "width", "approach", "energy"])
+def test_effectivity_on_hertz(quantity, target):
+    row = effectivity(indenter("axisymmetric", size=1e4), quantity, target)
+    assert row["estimate"] <= target and abs(row["true error"]) <= target
+    assert 0.5 <= row["effectivity"] <= 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("quantity", ["pressure", "width"])
+def test_effectivity_on_the_line_contact(quantity):
+    row = effectivity(indenter("plane-strain", size=1e4), quantity, 1e-2)
+    assert abs(row["true error"]) <= 1e-2 and 0.5 <= row["effectivity"] <= 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_effectivity_at_a_singular_edge(mu):
+    row = effectivity(flat("axisymmetric", mu), "approach", 3e-3)
+    assert abs(row["true error"]) <= 3e-3 and 0.5 <= row["effectivity"] <= 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["axisymmetric", "plane-strain"])
+def test_hertz_within_a_thousandth_on_5000_unknowns(kind):
+    scene = indenter(kind)
+    reduction, solution, _ = solve_zone(scene, 26)
+    assert reduction.dofs <= 5000
+    for quantity in ("pressure", "width"):
+        assert QUANTITIES[quantity](reduction, solution) == pytest.approx(exact(scene)[quantity], rel=1e-3)
