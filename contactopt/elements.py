@@ -1,4 +1,4 @@
-"""Displacement of degree 1 or 2 on triangles, quadrilaterals, tetrahedra and hexahedra, and its trace on the contact surface.
+"""Displacement of degree 1 or 2 on simplices and bricks, and its trace on the contact surface.
 
 Quadratic shape functions N_j cannot weigh contact forces themselves: on the faces of tetrahedra, and next to an axis of
 symmetry, their integrals vanish at the vertices. So the contact surface is covered by linear cells with hat functions

@@ -94,8 +94,8 @@ def patch(mesh: MeshQuad | MeshHex, boundary: str, name: str, limits: list[float
 def simplices(mesh: MeshQuad | MeshHex) -> MeshTri | MeshTet:
     """Every quadrilateral cut into two triangles, every hexahedron into six tetrahedra; boundaries keep their names.
 
-    Edges become straight. Bodies cut from meshes with the same cells on their contact faces match there, since all cells
-    are cut the same way. Raises InputError if neighbours are cut differently: number the vertices of all cells in the same order.
+    Edges become straight. Bodies cut from meshes with the same cells on their contact faces match there, since all
+    cells are cut the same way. Raises InputError if neighbours are not: number the vertices of all cells in one order.
     """
     vertices = mesh.p[:, : mesh.nvertices]
     cut = MeshQuad(vertices, mesh.t).to_meshtri() if len(vertices) == 2 else MeshHex(vertices, mesh.t).to_meshtet()

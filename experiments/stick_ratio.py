@@ -6,12 +6,13 @@ import time
 
 from matplotlib.figure import Figure
 
-from contactopt import reduce, scenes, solve
+from contactopt import Material, reduce, scenes, solve
+from contactopt.analytic import dundurs, stick_ratio
 from contactopt.plots import BLUE, GREEN, GREY, ORANGE
 from contactopt.zone import stick_half_width
 from experiments.report import write
 
-EXACT = 0.689087  # Spence's fully coupled value, plane strain, mu = nu = .3
+EXACT = stick_ratio(0.3, dundurs(None, Material(1.0, 0.3))[1])  # plane strain, mu = nu = .3
 WIDTHS = (160.0, 640.0, 1600.0, 6400.0, 25600.0, 102400.0)
 ELEMENTS = (64, 128, 256)
 
