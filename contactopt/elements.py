@@ -9,10 +9,10 @@ W_ij u_j,
 
     W_ij = int psi_i N_j / A_i,    psi_i linear on each cell,  int psi_i phi_j = delta_ij A_i   (dual basis).
 
-The psi_i add up to one: W has unit row sums, and A_i W_ij sums to int N_j, so that uniform pressure is exact. At degree 1
-W is the identity. Sources: Wohlmuth (2000), A mortar finite element method using dual spaces for the Lagrange multiplier,
-SIAM J. Numer. Anal. 38, 989-1012; Popp, Wohlmuth, Gee, Wall (2012), Dual quadratic mortar finite element methods for 3D
-finite deformation contact, SIAM J. Sci. Comput. 34, B421-B446.
+The psi_i add up to one: W has unit row sums, and A_i W_ij sums to int N_j, so that uniform pressure is exact. At degree
+1 W is the identity. Sources: Wohlmuth (2000), A mortar finite element method using dual spaces for the Lagrange
+multiplier, SIAM J. Numer. Anal. 38, 989-1012; Popp, Wohlmuth, Gee, Wall (2012), Dual quadratic mortar finite element
+methods for 3D finite deformation contact, SIAM J. Sci. Comput. 34, B421-B446.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ def match_bodies(scene: Scene, upper: Body | None, lower: Body | None) -> tuple[
 
 
 def _rigid_gap(part: Part | Rigid, body: Body, rigid: Rigid) -> np.ndarray:
-    """Initial gap (k,) between a body and a rigid one: what the gaps of the nodes contribute, as their displacements."""
+    """Initial gap (k,) between a body and a rigid one, from the gaps of the nodes with the weights of displacements."""
     if rigid.gap is None:
         return np.zeros(len(body.nodes))
     gap = np.asarray(rigid.gap(_true(part, body)), dtype=float)

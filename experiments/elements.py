@@ -250,37 +250,38 @@ def findings(rows: list[dict], ripple: list[dict]) -> str:
         other = own.pop("P2, contacts at all nodes")
         worst = max(own, key=lambda k: own[k])
         said.append(
-            f"- {case}: on the finest meshes the pressure within {INNER:g} a scatters by {100 * own['P2']:.2g} % of the peak "
-            f"on quadratic simplices, {100 * own['Q2']:.2g} % on quadratic bricks (most on {worst}, {100 * own[worst]:.2g} %); "
-            f"with contacts at all nodes of quadratic simplices it would be {100 * other:.2g} %."
+            f"- {case}: on the finest meshes the pressure within {INNER:g} a scatters by {100 * own['P2']:.2g} % of the "
+            f"peak on quadratic simplices, {100 * own['Q2']:.2g} % on quadratic bricks (most on {worst}, "
+            f"{100 * own[worst]:.2g} %); with contacts at all nodes of quadratic simplices it would be {100 * other:.2g} %."
         )
     return "\n".join(said)
 
 
-TEXT = """A rigid sphere and a rigid flat disc on a half-space, frictionless, E = 5 MPa, nu = .3; axisymmetric (body of 3,000
-contact radii, whose part in the approach, {size:.3f} % on the disc, found with one ten times as large, is taken out) and 3D
-(quarter model of 20 contact radii, no approach). Q: quadrilaterals or hexahedra, P:
-the same cut into triangles or tetrahedra, with the degree of the displacement. n elements across the contact half-width, all
-others in proportion. Errors are relative to the exact values. Time: of the processor, from meshes in hand to the
-certified solution, one core.
+TEXT = """A rigid sphere and a rigid flat disc on a half-space, frictionless, E = 5 MPa, nu = .3; axisymmetric (body of
+3,000 contact radii, whose part in the approach, {size:.3f} % on the disc, found with one ten times as large, is taken out)
+and 3D (quarter model of 20 contact radii, no approach). Q: quadrilaterals or hexahedra, P: the same cut into
+triangles or tetrahedra, with the degree of the displacement. n elements across the contact half-width, all others in
+proportion. Errors are relative to the exact values. Time: of the processor, from meshes in hand to the certified
+solution, one core.
 
 {findings}
 
-**Cost of an accuracy**: unknowns (and seconds) from which on the error stays below the target, between two runs by a power
-law; - not reached on these meshes.
+**Cost of an accuracy**: unknowns (and seconds) from which on the error stays below the target, between two runs by a
+power law; - not reached on these meshes.
 
 {cheapest}
 
-**Measured orders** in 1/n between the two finest meshes. Where contact ends by itself the displacement has 3/2 derivatives
-in the energy norm: the approach can gain 2 at degree 1 and at most 3 at degree 2; the tractions 1 in L2 at both. At the
-edge of the disc it has 1/2: order 1 of the approach at any degree on even elements. On graded ones it is 2 at degree 1; at
-degree 2 the displacement allows 4, the piecewise linear tractions of the dual basis promise 3 only. The peak at degree 1 is
-that of the node next to the axis, where linear elements of a ring are poor. Where an error changes its sign, a slope means
-nothing.
+**Measured orders** in 1/n between the two finest meshes. Where contact ends by itself the displacement has 3/2
+derivatives in the energy norm: the approach can gain 2 at degree 1 and at most 3 at degree 2; the tractions 1 in L2
+at both. At the edge of the disc it has 1/2: order 1 of the approach at any degree on even elements. On graded ones it
+is 2 at degree 1; at degree 2 the displacement allows 4, the piecewise linear tractions of the dual basis promise 3
+only. The peak at degree 1 is that of the node next to the axis, where linear elements of a ring are poor. Where an
+error changes its sign, a slope means nothing.
 
 {orders}
 
-**Ripple**: standard deviation of the error of the nodal pressures within .6 of the contact radius, over the peak pressure.
+**Ripple**: standard deviation of the error of the nodal pressures within .6 of the contact radius, over the peak
+pressure.
 
 {ripple}
 

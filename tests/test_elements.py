@@ -79,7 +79,7 @@ def test_stiffness_is_the_weak_form_of_elasticity(kind, degree, cut):
 
 @pytest.mark.parametrize("kind,degree,cut", SHAPES)
 def test_weights_pass_on_force_and_its_moment(kind, degree, cut):
-    """Rows of W add up to 1; A' W is the force of unit pressure on every node; linear displacements keep their place."""
+    """Rows of W add up to 1; A' W is the force of unit pressure on every node; contacts stay on their plane."""
     body = body_of(kind, degree, cut)
     W = body.weights
     assert np.allclose(W.sum(axis=1), 1, atol=1e-12)
@@ -156,7 +156,7 @@ def test_other_degrees_are_refused(degree):
 
 
 def test_a_half_model_is_half_of_the_whole():
-    """On the plane of symmetry the tangential component at degree 2 belongs to the support, as its mirror image asks."""
+    """The tangential component on the plane of symmetry belongs to the support, without its neighbours."""
     x = np.array([0.0, 0.3, 0.7, 1.0])
     whole, half = (tensor_mesh(grid, np.linspace(0, 1, 4)) for grid in (np.concatenate([-x[:0:-1], x]), x))
     both = []
