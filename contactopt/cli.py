@@ -47,6 +47,8 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--solver", metavar="NAME", default="auto", help="of the bodies: auto, " + ", ".join(SOLVERS))
     run.add_argument("--mu", type=float, metavar="X", help="friction coefficient")
     run.add_argument("--force", type=float, metavar="N", help="total normal force")
+    run.add_argument("--degree", type=int, metavar="1|2", help="linear or quadratic displacement (1)")
+    run.add_argument("--simplices", action="store_true", default=None, help="triangles or tetrahedra, not bricks")
     run.add_argument("--elements", type=int, metavar="N", help="elements across the contact half-width")
     run.add_argument(
         "--accuracy", type=float, metavar="X", help="refine until the quantity's relative error is below X"
@@ -81,7 +83,11 @@ def _run(options: argparse.Namespace) -> int:
     from contactopt.runner import run
 
     out = options.out or f"out/{options.scene}"
-    changes = {name: getattr(options, name) for name in ("mu", "force") if getattr(options, name) is not None}
+    changes = {
+        name: getattr(options, name)
+        for name in ("mu", "force", "degree", "simplices")
+        if getattr(options, name) is not None
+    }
     result = run(
         options.scene,
         out,
