@@ -40,3 +40,22 @@ def _cut(graph: sp.csr_matrix, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     below[np.argsort(x, kind="stable")[: len(x) // 2]] = True
     separator = below & (graph @ (~below).astype(np.int8) > 0)
     return below & ~separator, separator
+
+
+def elimination_order(
+    A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, points: np.ndarray, last: np.ndarray
+) -> np.ndarray:
+    """Permutation of the unknowns: nested dissection of the nodes without any of `last`, then the rest, then `last`."""
+    present, own = np.unique(node, return_inverse=True)
+    inside = np.ones(len(present), dtype=bool)
+    inside[own[last]] = False
+    gather = sp.csr_matrix((np.ones(len(own), np.int32), (own, np.arange(len(own)))), (len(present), len(own)))
+    pattern = sp.csr_matrix((np.ones(A.nnz, np.int32), A.indices, A.indptr), A.shape)
+    graph = (gather @ pattern @ gather.T).tocsr()[inside][:, inside]
+    graph.data = np.ones(graph.nnz, np.int8)
+    rank = np.full(len(present), len(present))
+    rank[np.flatnonzero(inside)[nested_dissection(graph, points[:, present[inside]])]] = np.arange(inside.sum())
+    order = np.lexsort((component, rank[own]))
+    final = np.zeros(len(own), dtype=bool)
+    final[last] = True
+    return np.concatenate([order[~final[order]], last])

@@ -13,8 +13,10 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
-from functools import cached_property
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, cached_property
 from importlib.util import find_spec
+from itertools import count
 from typing import Any, Protocol
 
 import numpy as np
@@ -22,7 +24,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from contactopt.dissection import nested_dissection
+from contactopt.dissection import elimination_order
 from contactopt.errors import InputError
 from contactopt.multigrid import VCycle, conjugate_gradients
 from contactopt.scene import check_number
@@ -103,7 +105,14 @@ class SuperLUSolver:
         self.last = last
         self.order = elimination_order(A, node, component, points, np.zeros(0, int) if last is None else last)
         ordered = A[self.order][:, self.order].tocsc()
-        self.factors = splu(ordered, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        home = _homes()[next(_TURN) % 2]
+        self._held = [home.submit(_factors, ordered).result()]
+        weakref.finalize(self, home.submit, self._held.clear).atexit = False
+
+    @property
+    def factors(self) -> Any:
+        """SciPy's SuperLU object."""
+        return self._held[0]
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         out = np.zeros(load.shape)
@@ -138,23 +147,17 @@ class SuperLUSolver:
         return _triangle_product(*self.trailing_triangle, load)
 
 
-def elimination_order(
-    A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, points: np.ndarray, last: np.ndarray
-) -> np.ndarray:
-    """Permutation of the unknowns: nested dissection of the nodes without any of `last`, then the rest, then `last`."""
-    present, own = np.unique(node, return_inverse=True)
-    inside = np.ones(len(present), dtype=bool)
-    inside[own[last]] = False
-    gather = sp.csr_matrix((np.ones(len(own), np.int32), (own, np.arange(len(own)))), (len(present), len(own)))
-    pattern = sp.csr_matrix((np.ones(A.nnz, np.int32), A.indices, A.indptr), A.shape)
-    graph = (gather @ pattern @ gather.T).tocsr()[inside][:, inside]
-    graph.data = np.ones(graph.nnz, np.int8)
-    rank = np.full(len(present), len(present))
-    rank[np.flatnonzero(inside)[nested_dissection(graph, points[:, present[inside]])]] = np.arange(inside.sum())
-    order = np.lexsort((component, rank[own]))
-    final = np.zeros(len(own), dtype=bool)
-    final[last] = True
-    return np.concatenate([order[~final[order]], last])
+_TURN = count()
+
+
+@cache
+def _homes() -> tuple[ThreadPoolExecutor, ThreadPoolExecutor]:
+    """Two threads that make and free factors: SuperLU frees its memory only in the thread that took it."""
+    return ThreadPoolExecutor(1), ThreadPoolExecutor(1)
+
+
+def _factors(A: sp.csc_matrix) -> Any:
+    return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 class PardisoSolver:

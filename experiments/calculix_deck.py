@@ -19,6 +19,7 @@ from contactopt import InputError, Part, Plate, Scene
 
 LAWS = ("bonded", "node-to-surface", "surface-to-surface", "mortar")
 TENSION = 1e-9  # of ccx's smoothed law at large gaps, over the mean pressure; it shifts the pressure by as much
+LEAST = 0.05  # increment of the load at which ccx gives up; the first is the whole load
 SPRING = 1e6  # stiffness that stands for a support where mortar contact allows none, over E thickness
 
 
@@ -26,12 +27,15 @@ SPRING = 1e6  # stiffness that stands for a support where mortar contact allows 
 class Contact:
     """law, one of LAWS; pressure per penetration and traction per slip before sliding [stress / length], both for penalty.
 
-    Mortar contact is hard in the normal direction and takes the `stick` slope only.
+    Mortar contact is hard in the normal direction and takes the `stick` slope only. `master` is the boundary of the lower
+    body on which the contact boundary of the upper one rests; '' for the contact boundary of its own. With friction it must
+    reach further: a node that slides over its edge is lost.
     """
 
     law: str
     stiffness: float = 0.0
     stick: float = 0.0
+    master: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +97,7 @@ def deck(bodies: Model, contact: Contact) -> str:
         *_boundaries(bodies, held, layered),
         *(_equation([(node, component, 1.0), (driven[0], component, -1.0)]) for node in driven[1:]),
         *(_bond(bodies, held) if contact.law == "bonded" else _contact(bodies, contact)),
-        "*STEP\n*STATIC\n1., 1.",
+        f"*STEP\n*STATIC\n1., 1., {LEAST}",
         f"*CLOAD\n{driven[0] + 1}, {component + 1}, {_number(_force(bodies.scene) / bodies.scene.copies)}",
         "*NODE PRINT, NSET=PLANE\nU\n*EL PRINT, ELSET=BODIES\nS\n*END STEP",
     ]
@@ -216,7 +220,7 @@ def _contact(bodies: Model, contact: Contact) -> list[str]:
     side = 3 if contact.law == "mortar" else 1  # the sides of a brick are its faces S3 to S6
     blocks = []
     for body, name in enumerate(("UPPER", "LOWER")):
-        faces = bodies.faces(body, _part(bodies, body).contact)
+        faces = bodies.faces(body, (contact.master if body else "") or _part(bodies, body).contact)
         blocks.append(f"*SURFACE, NAME={name}\n" + "\n".join(f"{e + 1}, S{s + side}" for e, s in faces))
     scene, slaves = bodies.scene, bodies.points[0, bodies.nodes(0, _part(bodies, 0).contact)]
     blocks.append("*SURFACE INTERACTION, NAME=LAW")

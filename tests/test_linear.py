@@ -1,12 +1,15 @@
+import gc
+import resource
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from contactopt import multigrid, scenes
+from contactopt import multigrid, reduce, scenes
 from contactopt.body import build_body
 from contactopt.errors import BackendError, InputError
 from contactopt.linear import LARGEST, SMALL, SOLVERS, choose, make_solver
@@ -205,3 +208,16 @@ def test_accuracy_that_cannot_be_had(monkeypatch):
     monkeypatch.setattr(multigrid, "MOST", 3)
     with pytest.raises(BackendError, match="within 3 iterations"):
         solver.solve(b)
+
+
+def test_factors_are_freed_whatever_thread_made_them():
+    """SuperLU forgets its memory where another thread frees it: ten reductions must not add up."""
+    statm = Path("/proc/self/statm")
+    if not statm.exists():
+        pytest.skip("reads the memory of the process from /proc")
+    scene, sizes = scenes.flat_punch(2, elements=120), []
+    for _ in range(10):
+        reduce(scene)
+        gc.collect()
+        sizes.append(int(statm.read_text().split()[1]) * resource.getpagesize() / 2**20)
+    assert sizes[-1] - sizes[3] < 15  # MiB; the factors of one reduction take about that
