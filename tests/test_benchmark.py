@@ -188,7 +188,8 @@ def test_killed_campaigns_lose_and_repeat_nothing(tmp_path):
 def test_an_interrupted_campaign_keeps_its_rows(tmp_path):
     path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 500")), tmp_path / "out"
     command = [sys.executable, "-m", "contactopt", "bench", str(path), "--out", str(out), "--jobs", "1"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+    heed = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731 (a job in the background ignores it)
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, preexec_fn=heed)
     while process.poll() is None and count(out) < 5:
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)

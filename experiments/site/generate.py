@@ -27,7 +27,17 @@ TUTORIALS = (
     "reading_a_strangers_problem",
 )
 # reports about accuracy; all others are about performance
-ACCURACY = ("patch_test", "hertz", "stick_ratio", "cattaneo", "load_cycle", "qp_backends")
+ACCURACY = (
+    "accuracy",
+    "elements",
+    "patch_test",
+    "hertz",
+    "stick_ratio",
+    "cattaneo",
+    "load_cycle",
+    "calculix",
+    "qp_backends",
+)
 PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
 # module -> what its page is called; every public name that `contactopt` exports lives in one of them
 MODULES = {
@@ -42,8 +52,12 @@ MODULES = {
     "diagnosis": "Diagnosis",
     "enumeration": "All solutions of small problems",
     "paths": "Load paths",
+    "animation": "Pictures of load paths",
+    "quantities": "Quantities whose accuracy can be asked for",
     "models": "Convex programs in cvxpy",
+    "operators": "The interface operator by its products",
     "preconditioners": "Preconditioners",
+    "linear": "Solvers of the bodies",
     "cones": "Cones and projections",
     "recover": "Displacements and stresses",
     "analytic": "Exact solutions",
@@ -86,7 +100,8 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     for name, title in present.items():
         yield Path("api", f"{name}.md"), module_page(name, title)
     yield Path("api.md"), index("Reference", reference_table(), [f"api/{name}" for name in present])
-    reports = {path.parent.name: path for path in sorted((ROOT / "reports").glob("*/report.md"))}
+    reports = {name_of(path): path for path in sorted((ROOT / "reports").glob("*/report.md"))}
+    reports |= {name_of(path): path for path in sorted((ROOT / "reports").glob("*.md"))}
     about = [name for name in ACCURACY if name in reports]
     for page, names in (("accuracy", about), ("performance", [name for name in reports if name not in about])):
         text = (site / f"{page}.md").read_text() + "".join(opening(reports[name]) for name in names)
@@ -95,7 +110,7 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
         yield Path("reports", f"{name}.md"), report(path)
         for picture in PICTURE.findall(path.read_text()):
             if (path.parent / picture[1]).exists():  # Sphinx names what is missing
-                yield Path("reports", name, picture[1]), path.parent / picture[1]
+                yield Path("reports", base(path), picture[1]), path.parent / picture[1]
 
 
 TUTORIAL_TEXT = """Each is a script, a notebook (open the file in Jupyter with jupytext, or in VS Code) and this page,
@@ -148,9 +163,19 @@ def reference_table() -> str:
     return "\n".join(["What `import contactopt` offers:\n", "| name | what it is |", "|---|---|", *rows, ""])
 
 
+def name_of(path: Path) -> str:
+    """reports/NAME/report.md or reports/NAME.md -> NAME."""
+    return path.parent.name if path.name == "report.md" else path.stem
+
+
+def base(path: Path) -> str:
+    """The folder that a report's pictures are named from, below reports/."""
+    return os.path.relpath(path.parent, ROOT / "reports")
+
+
 def report(path: Path) -> str:
     """A report as a page: pictures from its folder, other files by their place in the repository."""
-    text = PICTURE.sub(rf"![\1]({path.parent.name}/\2)", path.read_text())
+    text = PICTURE.sub(rf"![\1]({Path(base(path), 'x').parent.as_posix()}/\2)", path.read_text())
 
     def place(link: re.Match) -> str:
         target = os.path.relpath(path.parent / link[2], ROOT)
@@ -161,12 +186,12 @@ def report(path: Path) -> str:
 
 def opening(path: Path) -> str:
     """Title, first paragraph and first picture of a report, and the way to all of it."""
-    text = report(path).replace(f"({path.parent.name}/", f"(reports/{path.parent.name}/")
+    text = PICTURE.sub(r"![\1](reports/\2)", report(path))
     title, *paragraphs = text.strip().split("\n\n")
     first = next((p for p in paragraphs if p[0] not in "|#!"), "")
     picture = PICTURE.search(text)
     shown = f"{picture[0]}\n\n" if picture else ""
-    return f"\n## {title.removeprefix('# ')}\n\n{first}\n\n{shown}[All of this report](reports/{path.parent.name}.md)\n"
+    return f"\n## {title.removeprefix('# ')}\n\n{first}\n\n{shown}[All of this report](reports/{name_of(path)}.md)\n"
 
 
 def as_rst(lines: list[str]) -> list[str]:
