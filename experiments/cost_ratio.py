@@ -16,7 +16,7 @@ from contactopt import Scene, scenes, solve
 from contactopt.body import Body, build_body
 from contactopt.linear import make_solver
 from contactopt.reduction import reduce_bodies
-from experiments.report import write
+from experiments.report import merged, write
 
 REPEATS = 3
 SOLVERS = ("superlu", "pardiso")  # the latter where it is installed
@@ -130,5 +130,6 @@ def phases(name: str, solver: str) -> dict[str, Any]:
 if __name__ == "__main__":
     names = sys.argv[1:] or list(SCENES)
     pairs = [(n, s) for n in names for s in SOLVERS if s != "pardiso" or find_spec("pypardiso")]
-    tables = {"ratios": [measure(*pair) for pair in pairs], "phases": [phases(*pair) for pair in pairs]}
+    rows = {"ratios": [measure(*pair) for pair in pairs], "phases": [phases(*pair) for pair in pairs]}
+    tables = {name: merged("cost_ratio", name, table, ("scene", "solver")) for name, table in rows.items()}
     write("cost_ratio", "The price of friction", TEXT, tables, {})

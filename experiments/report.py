@@ -56,3 +56,24 @@ def write(
     foot = f"Made by `python -m experiments.{name}`.\nEnvironment: {environment()}."
     path.write_text(f"# {title}\n\n{body}\n\n{pictures}\n\n{foot}\n".replace("\n\n\n\n", "\n\n"))
     print(path.read_text())
+
+
+def merged(name: str, table: str, rows: list[dict[str, Any]], keys: tuple[str, ...]) -> list[dict[str, Any]]:
+    """The committed table of an experiment with these rows in place of those that have the same values of `keys`."""
+    path = REPORTS / name / f"{table}.csv"
+    if not path.exists():
+        return rows
+    with open(path, newline="") as file:
+        old = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    new = {tuple(str(row[key]) for key in keys): row for row in rows}
+    kept = [{key: _number(value) for key, value in row.items()} for row in old]
+    return [new.pop(tuple(str(row[key]) for key in keys), row) for row in kept] + list(new.values())
+
+
+def _number(text: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            pass
+    return text
