@@ -11,8 +11,8 @@ import statistics  # noqa: E402
 import time  # noqa: E402
 
 from contactopt import reduce, scenes, solve, transfer  # noqa: E402
-from contactopt.scenes import SCENES, make_scene  # noqa: E402
-from experiments.report import write  # noqa: E402
+from contactopt.scenes import make_scene  # noqa: E402
+from experiments.report import PAPER, write  # noqa: E402
 
 FRICTION = (0.0, 0.05, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 SERIES = {
@@ -78,4 +78,4 @@ The three scenes at default size: status, Newton steps, certificate.
 
 if __name__ == "__main__":
     rows = [row for series in SERIES for row in steps(series)]
-    write("newton_steps", "Newton steps", TEXT, {"steps": rows, "friction": [friction(name) for name in SCENES]}, {})
+    write("newton_steps", "Newton steps", TEXT, {"steps": rows, "friction": [friction(name) for name in PAPER]}, {})

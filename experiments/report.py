@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 REPORTS = Path(__file__).parents[1] / "reports"
+PAPER = ("punch-2d", "punch-3d", "sphere")  # the paper's scenes
 PACKAGES = ("numpy", "scipy", "scikit-fem", "qpsolvers", "cvxpy", "clarabel", "proxsuite", "osqp")
 
 

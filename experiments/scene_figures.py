@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from contactopt import plots, run
-from experiments.report import REPORTS
+from experiments.report import PAPER, REPORTS
 
 if __name__ == "__main__":
     folder = REPORTS / "figures"
     folder.mkdir(parents=True, exist_ok=True)
-    for name in ("punch-2d", "punch-3d", "sphere"):
+    for name in PAPER:
         result = run(name)
         picture = plots.deformed(result.scene, result.problem, result.fields).figure
         picture.savefig(folder / f"{name}-deformed.png", dpi=100)

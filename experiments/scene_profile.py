@@ -12,9 +12,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from experiments.report import write
+from experiments.report import PAPER, write
 
-THREE = ("punch-2d", "punch-3d", "sphere")  # the paper's
 REPEATS = 3
 METHODS = ("auto", "alternating")
 PHASES = ("assemble", "factorise", "compliance", "solve", "recover", "figures", "files")
@@ -82,5 +81,5 @@ the alternating iteration meets discs. Assembly and factorisation of the two bod
 """
 
 if __name__ == "__main__":
-    rows = [measure(scene, method) for scene in THREE for method in METHODS]
+    rows = [measure(scene, method) for scene in PAPER for method in METHODS]
     write("scene_profile", "Time and memory of the three scenes", TEXT, {"rows": rows}, {"shares": draw(rows)})
