@@ -6,7 +6,7 @@ import time
 
 from contactopt import InterfaceProblem, reduce, scenes, solve
 from contactopt.backends import QP
-from contactopt.methods import alternating
+from contactopt import splitting
 from experiments.report import write
 
 REPEATS = 5
@@ -35,12 +35,12 @@ def measure(name: str, exact, problem) -> dict[str, object]:  # type: ignore[no-
 
 
 def without_crossover(name: str, problem):  # type: ignore[no-untyped-def]
-    saved = alternating.certified
-    alternating.certified = as_it_comes
+    saved = splitting.certified
+    splitting.certified = as_it_comes
     try:
         return solve(problem, "alternating", normal=name, tangential=name, tol=1e-9, max_iterations=40)
     finally:
-        alternating.certified = saved
+        splitting.certified = saved
 
 
 def as_it_comes(solvers, equations):  # type: ignore[no-untyped-def]
