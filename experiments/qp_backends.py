@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import time
 
-from contactopt import InterfaceProblem, reduce, scenes, solve
+from contactopt import InterfaceProblem, reduce, scenes, solve, splitting
 from contactopt.backends import QP
-from contactopt import splitting
 from experiments.report import write
 
 REPEATS = 5
