@@ -17,6 +17,8 @@ methods for 3D finite deformation contact, SIAM J. Sci. Comput. 34, B421-B446.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import scipy.sparse as sp
 import skfem
@@ -89,7 +91,7 @@ def contact_trace(
         cells = np.arange(cells.shape[1])[None]  # the whole face
         places = places[:, cells[0]]
     phi, rule = _cell_rule(name, places, cells, degree)
-    at = skfem.FacetBasis(basis.mesh, shape, facets=boundary, quadrature=rule)
+    at = _face_basis(basis.mesh, shape, boundary, rule)
     N, node = _face_shapes(at, shape, boundary, places)
     split = (len(boundary), len(cells), phi.shape[1])  # face, cell, point
     flat = np.asarray(at.dx)
@@ -123,11 +125,27 @@ def _cell_rule(
     return phi, (everywhere, np.tile(share / len(cells), len(cells)))
 
 
+def _face_basis(
+    mesh: skfem.Mesh, shape: skfem.Element, boundary: np.ndarray, rule: tuple[np.ndarray, np.ndarray]
+) -> skfem.FacetBasis:
+    """FacetBasis that finds the places on the elements to what rounding of the coordinates allows.
+
+    scikit-fem asks Newton's iteration for 1e-12 of an element, out of reach where elements are small beside their distance
+    from the origin.
+    """
+    mapping = mesh._mapping()
+    if not isinstance(mapping, skfem.MappingAffine):
+        corners = mesh.p[:, mesh.facets[:, boundary]]
+        rounding = np.finfo(float).eps * np.abs(corners).max() / np.ptp(corners, axis=1).max(axis=0).min()
+        mapping.invF = partial(type(mapping).invF, mapping, newton_tol=max(1e-12, 16 * rule[0].shape[1] * rounding))
+    return skfem.FacetBasis(mesh, shape, mapping, facets=boundary, quadrature=rule)
+
+
 def _face_shapes(
     at: skfem.FacetBasis, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Shape functions (face, j, point) of the nodes at the places of every face, and these nodes (face, j)."""
-    nodal = skfem.FacetBasis(at.mesh, shape, facets=boundary, quadrature=(places, np.ones(places.shape[1])))
+    nodal = _face_basis(at.mesh, shape, boundary, (places, np.ones(places.shape[1])))
     local = np.argmax(np.stack([np.asarray(f[0]) for f in nodal.basis], axis=1), axis=1)  # the one that is 1 there
     N = np.take_along_axis(np.stack([np.asarray(f[0]) for f in at.basis], axis=1), local[:, :, None], axis=1)
     unknowns = np.take_along_axis(nodal.element_dofs.T, local, axis=1)

@@ -26,7 +26,7 @@ from contactopt import (
     solve,
 )
 from contactopt.body import build_body, lame
-from contactopt.elements import FACES, weight_at
+from contactopt.elements import FACES, contact_trace, make_basis, weight_at
 from contactopt.mesh import rename, simplices, tensor_mesh
 from contactopt.recover import recover
 from contactopt.scenes.common import with_elements
@@ -247,3 +247,16 @@ def test_quadratic_bodies_by_products(solver, cut):
     implicit = reduce_bodies(scene, Q="implicit", solver=solver).problem
     r = np.random.default_rng(0).standard_normal(explicit.q.size)
     assert np.abs(implicit.Q @ r - explicit.Q @ r).max() < 1e-7 * np.abs(explicit.Q @ r).max()
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_small_elements_far_from_the_origin_keep_their_areas(dim, degree):
+    near = tensor_mesh(*[np.linspace(0.0, 1.0, 5)] * dim).with_boundaries({"contact": lambda x: x[-1] > 1 - 1e-6})
+    far = replace(near, doflocs=near.p + 1e5)
+    found = [
+        contact_trace(make_basis(mesh, degree, False), degree, mesh.boundaries["contact"], (1.0, False))
+        for mesh in (near, far)
+    ]
+    for here, there in zip(*found):
+        assert abs(there - here).max() < 1e-8
