@@ -47,7 +47,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--solver", metavar="NAME", default="auto", help="of the bodies: auto, " + ", ".join(SOLVERS))
     run.add_argument("--mu", type=float, metavar="X", help="friction coefficient")
     run.add_argument("--force", type=float, metavar="N", help="total normal force")
-    run.add_argument("--degree", type=int, metavar="1|2", help="linear or quadratic displacement (1)")
+    run.add_argument("--degree", type=int, metavar="1|2", help="linear or quadratic displacement (the scene's own)")
     run.add_argument("--simplices", action="store_true", default=None, help="triangles or tetrahedra, not bricks")
     run.add_argument("--elements", type=int, metavar="N", help="elements across the contact half-width")
     run.add_argument(

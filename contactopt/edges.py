@@ -1,11 +1,17 @@
-"""Where contact and stick end, below the element size: read from how the tractions fall to their bounds.
+"""Where contact and stick end, below the element size: read from how tractions and slip fall to zero.
 
 Next to an edge at distance c from the centre, the pressure (where contact ends by itself) and the slack of the
-friction bound (where stick ends) are proportional to sqrt(c^2 - x^2). A straight line through the squares of values
-inside, against x^2, meets zero at the edge.
+friction bound (where stick ends) are proportional to sqrt(c^2 - x^2), and the slip beyond c to (x - c)^(3/2). A straight
+line through the squares of values inside, against x^2, or through slip^(2/3), against x, meets zero at the edge.
+
+A discrete edge is at a node, and jumps from node to node as the exact one moves; the tractions and slips of the nodes
+next to it jump with it, those an element further hardly do. So the lines leave the nearest ones out: what they read then falls
+smoothly with the element size, as the estimate of an error needs it.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -14,60 +20,99 @@ from contactopt.problem import InterfaceProblem
 from contactopt.scene import Scene
 from contactopt.zone import contact_half_width, pressed, stick_half_width, stuck
 
-FIT = 6  # distances from the centre that the line is fitted to
-ROUGH = 3  # the outermost ones, which carry most of the discretisation error, left out
-NEAREST = 3  # to fit where the squares are straight only next to the edge
+Window = tuple[int, int]  # distances from the centre next to the edge: how many are left out, how many are fitted
+
+SMOOTH: Window = 3, 6  # where contact ends by itself: the outermost carry most of the discretisation error
+NEAR: Window = 1, 2  # where the values are straight only next to the edge
 
 
 def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
     """Half-width of a contact zone about x = 0 [length]; where it is no such zone or ends at a corner, by its area."""
-    inside = pressed(reactions)
-    edge = _edge(problem, reactions[:, 0] / problem.areas, inside, ROUGH, FIT)
-    return contact_half_width(scene, problem, reactions) if edge is None else edge
+    edge, pressure = _Edge.of(problem, pressed(reactions)), reactions[:, 0] / problem.areas
+    read = None if edge is None else edge.inner(pressure, SMOOTH)
+    if edge is None or read is None:
+        return contact_half_width(scene, problem, reactions)
+    return edge.clip(read)
 
 
-def stick_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
+def stick_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray, slip: np.ndarray | None = None) -> float:
     """Half-width of a stick zone about x = 0 [length]; where it is no such zone, by its area.
 
+    slip  (k, dim - 1) of the step that led to the reactions [length], if known
     The slack counts towards the direction in which the nearest slipping node slips. Where contact ends at a corner, the
-    pressure is singular: the slack relative to its bound stays smooth but not straight, so that the nearest values
-    serve best.
+    pressure is singular: the slack relative to its bound stays smooth but not straight, so that near values serve best, and
+    the mean of what the slack inside and the slip outside read. Small steps of a path slip otherwise: their reading, off by more
+    than an element, is left out.
     """
     touching, inside = pressed(reactions), stuck(reactions, problem.mu)
-    slipping = touching & ~inside
-    edge = None
-    if slipping.any():
+    found, edge = list[float](), _Edge.of(problem, inside)
+    if edge is not None and np.any(touching & ~inside):
         bound, r_t = problem.mu * np.abs(reactions[:, 0]), reactions[:, 1:]
-        nearest = np.flatnonzero(slipping)[KDTree(problem.coordinates.T[slipping]).query(problem.coordinates.T)[1]]
-        size = np.maximum(np.linalg.norm(r_t[nearest], axis=1), 1e-300)
-        slack = bound - np.sum(r_t * r_t[nearest], axis=1) / size
-        if touching.all():
-            edge = _edge(problem, slack / np.where(bound > 0, bound, 1.0), inside, 0, NEAREST)
+        slack = bound - np.sum(r_t * _directions(problem, r_t, touching & ~inside), axis=1)
+        if not touching.all():
+            read = edge.inner(slack / problem.areas, SMOOTH)
+            found = [] if read is None else [edge.clip(read)]
         else:
-            edge = _edge(problem, slack / problem.areas, inside, ROUGH, FIT)
-    edge = stick_half_width(scene, problem, reactions) if edge is None else edge
-    return min(edge, contact_edge(scene, problem, reactions))
+            reads = [edge.inner(slack / np.where(bound > 0, bound, 1.0), NEAR)]
+            if slip is not None:
+                reads.append(edge.outer(np.linalg.norm(slip, axis=1), NEAR))
+            found = [read for read in reads if read is not None and edge.clip(read) == read]
+    width = float(np.mean(found)) if found else stick_half_width(scene, problem, reactions)
+    return min(width, contact_edge(scene, problem, reactions))
 
 
-def _edge(problem: InterfaceProblem, value: np.ndarray, inside: np.ndarray, skip: int, fit: int) -> float | None:
-    """Where value^2, a line in distance^2 through `fit` distances of nodes inside, `skip` from the edge, is zero."""
-    if inside.all() or not inside.any():
-        return None
-    distance = np.linalg.norm(problem.coordinates[: problem.dim - 1], axis=0)
-    last, first = distance[inside].max(), distance[~inside].min()
-    step = _spacing(problem.coordinates, distance, last)
-    if abs(first - last) > 1.5 * step:  # not a zone about the centre
-        return None
-    rings = _rings(distance[inside], step, skip + fit)
-    skip = max(0, min(skip, len(rings) - fit))
-    outer, inner = rings[skip], rings[min(skip + fit, len(rings)) - 1]
-    near = inside & (distance <= outer + 1e-5 * step) & (distance >= inner - 1e-5 * step)
-    if np.ptp(distance[near]) <= 1e-5 * step:
-        return None
-    slope, height = np.polyfit(distance[near] ** 2, value[near] ** 2, 1)
-    if slope >= 0 or height <= 0:
-        return None
-    return float(np.clip(np.sqrt(-height / slope), last - step / 2, last + 1.5 * step))
+def _directions(problem: InterfaceProblem, r_t: np.ndarray, slipping: np.ndarray) -> np.ndarray:
+    """Unit vectors (k, dim - 1) of friction at the slipping node nearest to each node."""
+    x = problem.coordinates.T
+    nearest = r_t[np.flatnonzero(slipping)[KDTree(x[slipping]).query(x)[1]]]
+    return np.asarray(nearest / np.maximum(np.linalg.norm(nearest, axis=1), 1e-300)[:, None])
+
+
+@dataclass(frozen=True, eq=False)
+class _Edge:
+    """Between the last distance inside a zone about the centre and the first outside; step: of the nodes next to it."""
+
+    distance: np.ndarray
+    inside: np.ndarray
+    step: float
+
+    @classmethod
+    def of(cls, problem: InterfaceProblem, inside: np.ndarray) -> _Edge | None:
+        """None where the nodes inside are none, all, or no zone about the centre."""
+        if inside.all() or not inside.any():
+            return None
+        distance = np.linalg.norm(problem.coordinates[: problem.dim - 1], axis=0)
+        step = _spacing(problem.coordinates, distance, distance[inside].max())
+        zone = abs(distance[~inside].min() - distance[inside].max()) <= 1.5 * step
+        return cls(distance, inside, step) if zone else None
+
+    def inner(self, value: np.ndarray, window: Window) -> float | None:
+        """Where value^2, a line in distance^2 through values inside, is zero."""
+        depth = self.distance[self.inside].max() - self.distance
+        square = self._zero(self.distance**2, value**2, self.inside, depth, window)
+        return None if square is None or square <= 0 else float(np.sqrt(square))
+
+    def outer(self, value: np.ndarray, window: Window) -> float | None:
+        """Where value^(2/3), a line in the distance through values outside, is zero."""
+        depth = self.distance - self.distance[~self.inside].min()
+        return self._zero(self.distance, value ** (2 / 3), ~self.inside, depth, window)
+
+    def clip(self, edge: float) -> float:
+        """To less than an element from where the nodes say it is."""
+        last = self.distance[self.inside].max()
+        return float(np.clip(edge, last - self.step / 2, last + 1.5 * self.step))
+
+    def _zero(self, x: np.ndarray, y: np.ndarray, side: np.ndarray, depth: np.ndarray, window: Window) -> float | None:
+        """Of a line through y(x) at the rings in the window on one side; None if it does not fall towards the edge."""
+        rings = _rings(depth[side], self.step, sum(window))
+        skip = max(0, min(window[0], len(rings) - window[1]))
+        fitted = rings[skip : skip + window[1]]
+        near = side & (depth >= fitted[0] - 1e-5 * self.step) & (depth <= fitted[-1] + 1e-5 * self.step)
+        if np.ptp(depth[near]) <= 1e-5 * self.step:
+            return None
+        slope, height = np.polyfit(x[near], y[near], 1)
+        falls = (slope < 0) == bool(self.inside[near][0])
+        return float(-height / slope) if slope and falls else None
 
 
 def _spacing(coordinates: np.ndarray, distance: np.ndarray, edge: float) -> float:
@@ -76,9 +121,9 @@ def _spacing(coordinates: np.ndarray, distance: np.ndarray, edge: float) -> floa
     return float(np.median(KDTree(coordinates.T).query(coordinates.T[near], k=2)[0][:, 1]))
 
 
-def _rings(distance: np.ndarray, step: float, count: int) -> list[float]:
-    """The largest distances, at most `count`, each about a step or more below the one before."""
-    rings = [float(distance.max())]
-    while len(rings) < count and np.any(below := distance < rings[-1] - 0.75 * step):
-        rings.append(float(distance[below].max()))
+def _rings(depth: np.ndarray, step: float, count: int) -> list[float]:
+    """The least depths, at most `count`, each about a step or more beyond the one before."""
+    rings = [float(depth.min())]
+    while len(rings) < count and np.any(beyond := depth > rings[-1] + 0.75 * step):
+        rings.append(float(depth[beyond].min()))
     return rings

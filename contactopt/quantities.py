@@ -130,9 +130,11 @@ def width(reduction: Reduction, solution: Solution) -> float:
 def _stick_ratio(reduction: Reduction, solution: Solution) -> float:
     from contactopt.edges import contact_edge, stick_edge
 
-    given = reduction.scene, reduction.problem, solution.reactions
+    problem = reduction.problem
+    given = reduction.scene, problem, solution.reactions
     edge = contact_edge(*given)
-    return stick_edge(*given) / edge if edge > 0 else 0.0
+    slip = problem.displacements(solution.reactions, solution.multipliers)[:, 1:]
+    return stick_edge(*given, slip) / edge if edge > 0 else 0.0
 
 
 def _approach(reduction: Reduction, solution: Solution) -> float:

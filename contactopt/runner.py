@@ -156,6 +156,7 @@ def _summary(
 ) -> dict[str, Any]:
     problem, r = reduction.problem, solution.reactions
     width = zones[-1] if zones else contact_edge(scene, problem, r)
+    slip = problem.displacements(r, solution.multipliers)[:, 1:]
     return {
         "scene": scene.name,
         "dofs": reduction.dofs,
@@ -170,7 +171,7 @@ def _summary(
         "normal_force": float(r[:, 0].sum()),
         "approach": approach(problem, solution),
         "contact_half_width": float(width),
-        "stick_half_width": min(float(width), stick_edge(scene, problem, r)),
+        "stick_half_width": min(float(width), stick_edge(scene, problem, r, slip)),
         "max_pressure": float((r[:, 0] / problem.areas).max()),
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,

@@ -66,3 +66,37 @@ def test_all_or_nothing_sticks():
     assert stick_edge(scene, problem, full) == pytest.approx(1.1)  # areas of the nodes: 2.2, half of it
     slipping = np.stack([np.ones(11), np.full(11, 0.5)], axis=1)
     assert stick_edge(scene, problem, slipping) == 0.0
+
+
+def punch(c: float) -> tuple[Scene, InterfaceProblem, np.ndarray, np.ndarray, np.ndarray]:
+    """Contact up to a corner at 1, stick up to c: scene, problem, distances, reactions and slip."""
+    x = np.linspace(-1.0, 1.0, 101)
+    areas = np.full(101, 0.02)
+    scene, problem = contact(x[None], "plane-strain", areas)
+    distance = np.abs(x)
+    p = 1 / np.sqrt(1.01 - x**2)
+    bound = 1 - np.sqrt(np.maximum(0.0, 1 - (distance / c) ** 2))
+    r = areas[:, None] * np.stack([p, -0.5 * p * bound * np.sign(x)], axis=1)
+    return scene, problem, distance, r, (np.maximum(0.0, distance - c) ** 1.5 * np.sign(x))[:, None]
+
+
+@pytest.mark.parametrize("c", [0.613, 0.3, 0.87])
+def test_stick_edge_of_exact_slack_and_slip(c):
+    scene, problem, _, r, slip = punch(c)
+    assert stick_edge(scene, problem, r) == pytest.approx(c, rel=1e-9)
+    assert stick_edge(scene, problem, r, slip) == pytest.approx(c, rel=1e-9)
+    assert stick_edge(scene, problem, r, slip * 1e-12) == pytest.approx(c, rel=1e-9)
+
+
+def test_stick_edge_is_the_mean_of_what_slack_and_slip_read():
+    c = 0.613
+    scene, problem, distance, r, slip = punch(c)
+    moved = np.where(distance > c, np.maximum(0.0, distance - c + 0.004) ** 1.5, 0.0)[:, None] * np.sign(slip)
+    assert stick_edge(scene, problem, r, moved) == pytest.approx(c - 0.002, rel=1e-9)
+
+
+def test_slip_of_a_small_step_does_not_move_the_stick_edge():
+    c = 0.613
+    scene, problem, distance, r, slip = punch(c)
+    step = (np.maximum(0.0, distance - c) ** 0.5)[:, None] * np.sign(slip)
+    assert stick_edge(scene, problem, r, step) == pytest.approx(c, rel=1e-9)

@@ -53,17 +53,17 @@ PATHS: dict[str, Callable[..., tuple[Scene, ...]]] = {
 }
 
 
-def make_scene(name: str, *, degree: int = 1, simplices: bool = False, **changes: object) -> Scene:
+def make_scene(name: str, *, degree: int | None = None, simplices: bool = False, **changes: object) -> Scene:
     """The named scene with some of its arguments changed; InputError for an unknown name or argument.
 
-    degree     of the displacement, 1 or 2;  simplices  triangles or tetrahedra instead of quadrilaterals or hexahedra
+    degree     of the displacement, 1 or 2, None for the scene's own;  simplices  triangles or tetrahedra instead of quadrilaterals or hexahedra
     """
     if name not in SCENES:
         raise InputError(f"unknown scene {name!r}; choose from {', '.join(SCENES)}.")
     return with_elements(_made(name, SCENES[name][0], changes), degree, simplices)
 
 
-def make_path(name: str, *, degree: int = 1, simplices: bool = False, **changes: object) -> tuple[Scene, ...]:
+def make_path(name: str, *, degree: int | None = None, simplices: bool = False, **changes: object) -> tuple[Scene, ...]:
     """The load path of a named scene, its arguments and those of its states changed; InputError if it has none.
 
     degree, simplices  as in make_scene

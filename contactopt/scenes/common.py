@@ -28,8 +28,8 @@ def check_count(name: str, value: int) -> None:
         raise InputError(f"{name} must be a whole number of at least 1; got {value!r}.")
 
 
-def with_elements(scene: Scene, degree: int = 1, simplices: bool = False) -> Scene:
-    """The scene with displacements of that degree, its quadrilaterals or hexahedra cut into simplices or not."""
+def with_elements(scene: Scene, degree: int | None = None, simplices: bool = False) -> Scene:
+    """The scene with displacements of that degree (None: its own), its quadrilaterals or hexahedra cut into simplices or not."""
 
     def cut(part: Any) -> Any:
         if not simplices or not isinstance(part, Part):
@@ -42,4 +42,6 @@ def with_elements(scene: Scene, degree: int = 1, simplices: bool = False) -> Sce
 
         return replace(part, mesh=mesh)
 
-    return replace(scene, degree=degree, upper=cut(scene.upper), lower=cut(scene.lower))
+    return replace(
+        scene, degree=scene.degree if degree is None else degree, upper=cut(scene.upper), lower=cut(scene.lower)
+    )
