@@ -7,10 +7,12 @@ whatever size the mesh function holds fixed. The error is taken as one part that
 
     J(elements, splits) - J = A elements^-p + B 2^(-p' splits),
 
-both read from differences of nested solutions (Richardson): the first of the meshes for n, 2 n, 4 n elements, the second of the last
-of them and its split, measured anew on the mesh that it asks to split. Their sizes are added, the larger part is refined next. Orders are observed where there are three solutions, and held between 3/4 and 2 per degree of the displacement,
-the order of functionals of smooth solutions. Not estimated, because no refinement shows it: what finite bodies differ
-from half-spaces, and the steps of a load path.
+both read from differences of nested solutions (Richardson): the first of the meshes for n, 2 n, 4 n elements, the
+second of the last of them and its split, measured anew on the mesh that it asks to split. Their sizes are added, the
+larger part is refined next. Orders are observed where there are three solutions, and held between 3/4 and 2 per degree
+of the displacement, the order of functionals of smooth solutions, or 2 where an edge is read, since the solution is not
+smooth there. Not estimated, because no refinement shows it: what finite bodies differ from half-spaces, and the steps
+of a load path.
 
 Source: Roache (1998), Verification and Validation in Computational Science and Engineering, chapter 5.
 """
@@ -40,6 +42,7 @@ COARSEST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at 
 BELOW = 8  # and by how much fewer than the scene's default
 LARGEST = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about a gigabyte and half a minute
 SLOWEST = 0.75  # least order that is believed: slower ones were noise wherever the exact value was known
+EDGES = ("width", "stick")
 STUCK = 0.1  # order below which a sequence does not converge
 
 
@@ -171,7 +174,7 @@ class _Search:
         scene = states[-1]
         self.given = not all(callable(part.mesh) for part in (scene.upper, scene.lower) if isinstance(part, Part))
         self.first = scene.elements if self.given else max(COARSEST[scene.dim], scene.elements // BELOW)
-        self.best = 2 * scene.degree
+        self.best = 2 if quantity in EDGES else 2 * scene.degree
         self.levels: list[Level] = []
         self.meshes: list[Level] = []
         self.changes: list[float] = []

@@ -1,4 +1,7 @@
-"""The command line: `contactopt run SCENE` and `contactopt list`."""
+"""The command line.
+
+Exit codes: 0 done (run: solved, and to the accuracy asked for), 1 not solved, 2 input that cannot be used, 130 interrupted.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ from contactopt.scenes import PATHS, SCENES
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code: 0 solved, 1 not solved, 2 bad input."""
-    options = _parser().parse_args(arguments)
+    options = make_parser().parse_args(arguments)
     try:
         return int(options.command(options))
     except InputError as error:
@@ -28,7 +31,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """Commands and options."""
     parser = argparse.ArgumentParser("contactopt", description="Frictional contact as mathematical programs.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     run = commands.add_parser("run", help="solve a scene, write its summary, figures and fields")

@@ -141,7 +141,8 @@ class Scene:
     thickness  depth of a plane-strain body [length].
     copies     how many mirror images make the whole body: 2 for a half model, 4 for a quarter. Forces, nodal
                forces and nodal areas are those of all the images together, as on the ring of an axisymmetric body.
-    degree     of the displacement in every element: 1, linear, or 2, quadratic.
+    degree     of the displacement in every element: 1, linear, or 2, quadratic; 2 for nearly incompressible bodies,
+               where linear elements lock.
     bilateral  no separation: the normal displacement always equals the initial gap, the friction bound is mu |r_n|.
     elements   default number of elements across the contact half-width, for parts whose mesh is a function.
     zone       first guess of the contact half-width [length]; None when the geometry fixes the contact zone.

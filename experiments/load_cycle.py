@@ -43,7 +43,7 @@ def cycle(steps: int) -> dict[str, object]:
 
 
 def growing(mu: float, steps: int) -> dict[str, object]:
-    states = scenes.growing_indentation(mu=mu, steps=steps)
+    states = scenes.growing_indentation(mu=mu, steps=steps, elements=160)
     path = follow(states)
     history, exact = path.history, states[-1].reference
     ratio = exact.stick_half_width / exact.half_width

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import importlib
 import inspect
@@ -9,9 +10,11 @@ import os
 import re
 import shutil
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import contactopt
+import contactopt.cli
 from contactopt.methods import METHODS
 
 ROOT = Path(__file__).parents[2]
@@ -96,6 +99,7 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     table = "\n".join(f"| [{name}](methods/{name}.md) | {what} |" for name, (_, _, what) in METHODS.items())
     text = f"{METHODS_TEXT}\n| method | what it is |\n|---|---|\n{table}\n"
     yield Path("methods.md"), index("Methods", text, [f"methods/{name}" for name in METHODS], hidden=True)
+    yield Path("command_line.md"), command_line()
     present = {name: title for name, title in MODULES.items() if importlib.util.find_spec(f"contactopt.{name}")}
     for name, title in present.items():
         yield Path("api", f"{name}.md"), module_page(name, title)
@@ -119,6 +123,17 @@ about ten minutes to read. All claims are asserted; exercises hide their solutio
 METHODS_TEXT = """Every method is called by name, `contactopt.solve(problem, "newton")`, and every answer of every method
 gets the same certificate. Letters and signs are those of [the mathematics](../mathematics.md).
 """
+
+
+def command_line() -> str:
+    """The help of every command."""
+    parser = contactopt.cli.make_parser()
+    commands = next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction)).choices
+    pages = [f"# Command line\n\n{inspect.getdoc(contactopt.cli)}\n"]
+    for name, command in commands.items():
+        command.formatter_class = partial(argparse.HelpFormatter, width=100)
+        pages.append(f"## contactopt {name}\n\n```text\n{command.format_help()}```\n")
+    return "\n".join(pages)
 
 
 def index(title: str, text: str, pages: list[str], hidden: bool = False) -> str:
