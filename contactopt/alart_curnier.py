@@ -93,16 +93,20 @@ def newton_step(
 
 
 def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
-    """All contacts glued if a plate presses the bodies together, else no force at all."""
+    """The bonded solution: all contacts glued if a plate presses the bodies together, else those that would penetrate.
+
+    Without a plate no force at all, if its residual is smaller: forces that bond rigid bodies are of any size. On elastic
+    bodies Newton's method cycles from there, because it takes contacts for sliding before friction acts.
+    """
     zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
-    if len(problem.s) == 0:
+    glued = np.full(len(problem.q), problem.bilateral or len(problem.s) > 0) | (problem.q[:, 0] < 0)
+    if not glued.any():
         return zero
-    glue = Equations(
-        problem.Q,
-        problem.q,
-        problem.V,
-        problem.s,
-        lambda y: (y, np.broadcast_to(np.eye(y.shape[1]), (*y.shape, y.shape[1]))),
-    )
+    D = np.where(glued[:, None, None], np.eye(problem.dim), 0.0)
+    glue = Equations(problem.Q, problem.q, problem.V, problem.s, lambda y: (np.where(glued[:, None], y, 0.0), D))
     _, error, balance, D = glue.evaluate(*zero)
-    return (step or dense(problem)[1])(glue, error, balance, D, FIRST) or zero
+    bonded = (step or dense(problem)[1])(glue, error, balance, D, FIRST)
+    if bonded is None or len(problem.s):
+        return bonded or zero
+    equations = coulomb_equations(problem)
+    return min(zero, bonded, key=lambda point: equations.evaluate(*point)[0])

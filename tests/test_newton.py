@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve, transfer
 from contactopt.alart_curnier import coulomb_equations
+from contactopt.benchmark.problems import rigid_bodies as random_rigid_bodies
+from contactopt.benchmark.problems import tangential
 from contactopt.bonded import Bonded
 from contactopt.cones import coulomb_map
 from contactopt.methods.auto import Auto
@@ -103,6 +105,17 @@ def test_proximal_finds_what_newton_misses():
     problems = [rigid_bodies(seed, 10, 40, 0.7) for seed in range(6)]
     newton = [solve(problem, "newton", max_iterations=50).solved for problem in problems]
     assert not all(newton) and all(solve(problem).solved for problem in problems)
+
+
+def test_bonded_start_without_a_plate():
+    problem = tangential(of="punch-3d", elements=9)
+    solution = solve(problem, "newton")
+    assert solution.solved and solution.iterations <= 4  # from no force at all it cycles
+
+
+def test_auto_gives_slow_loops_their_time():
+    problem = random_rigid_bodies(bodies=5, contacts=20, mu=0.7, seed=0)
+    assert solve(problem).solved  # after a restart: the first loop is cut short
 
 
 def test_duplicated_contacts_share_the_force():

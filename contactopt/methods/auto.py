@@ -4,9 +4,9 @@
    (reports/newton_steps), each step one dense linear system.
 2. CONES iterations of the Acary-Cadoux fixed point: convex programs, which no cycle and no rank deficiency of Q disturbs.
 3. The proximal loop from there, which needs no symmetric Q and no backend.
-4. When ROUND outer iterations have not halved the residual, the loop starts again from contact forces drawn at random
-   (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong friction may have solutions that
-   repel the loop and others that attract it.
+4. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
+   contact forces drawn at random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
+   friction may have solutions that repel the loop and others that attract it.
 It ends where the driver's certificate or limits say so. There is no proof that it finds a solution: Coulomb's problem
 may have none.
 """
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
-from itertools import islice
+from itertools import count, islice
 from typing import ClassVar
 
 import numpy as np
@@ -34,7 +34,7 @@ LIMIT = 25  # Newton steps
 PATIENCE = 6  # of them without progress
 PROGRESS = 0.9  # a residual that falls by less is no progress
 CONES = 5  # cone programs
-ROUND = 20  # outer iterations of the proximal loop that must halve the residual
+ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
 LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 
 
@@ -56,8 +56,8 @@ class Auto:
         problem = problem.explicit()  # all that follows looks at the entries of Q
         reached = yield from self._cones(problem, reached)
         random = np.random.default_rng(0)
-        while True:
-            last = yield from self._proximal(problem, reached)
+        for restarts in count():
+            last = yield from self._proximal(problem, reached, ROUND * 2**restarts)
             r = random.normal(size=problem.q.shape)
             r[:, 0] = np.abs(r[:, 0])
             r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
@@ -69,12 +69,12 @@ class Auto:
     ) -> Generator[Iterate, None, Iterate]:
         """Newton's iterates; returns the best."""
         best, reached, since = np.inf, start, 0
-        for count, (point, residual) in enumerate(Newton(preconditioner=preconditioner).steps(problem, start)):
+        for steps, (point, residual) in enumerate(Newton(preconditioner=preconditioner).steps(problem, start)):
             yield point
             since = 0 if residual < PROGRESS * best else since + 1
             if residual < best:
                 best, reached = residual, point
-            if since >= PATIENCE or count >= LIMIT:
+            if since >= PATIENCE or steps >= LIMIT:
                 break
         return reached or cold_start(problem)
 
@@ -95,14 +95,14 @@ class Auto:
         return reached
 
     @staticmethod
-    def _proximal(problem: InterfaceProblem, start: Iterate) -> Generator[Iterate, None, Iterate]:
-        """Iterates of the proximal loop while each ROUND of them halves the residual; returns the last."""
+    def _proximal(problem: InterfaceProblem, start: Iterate, patience: int) -> Generator[Iterate, None, Iterate]:
+        """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last."""
         equations = coulomb_equations(problem)
         best, target, point = np.inf, np.inf, start
-        for count, point in enumerate(Proximal().iterate(problem, start)):
+        for done, point in enumerate(Proximal().iterate(problem, start), start=1):
             yield point
             best = min(best, equations.evaluate(*point)[0])
-            if count % ROUND == ROUND - 1:
+            if done % patience == 0:
                 if best > target:
                     break
                 target = best / 2
