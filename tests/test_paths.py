@@ -161,6 +161,15 @@ def test_units_do_not_matter():
     assert stiff["stick_half_width"] == pytest.approx(small["stick_half_width"], rel=1e-6)
 
 
+@pytest.mark.parametrize("simplices", [False, True])
+def test_quadratic_elements_follow_the_same_path(cycle, simplices):
+    states = scenes.make_path("cattaneo-2d", degree=2, simplices=simplices, steps=3, elements=10, shear=30.0)
+    h = follow(states).history
+    np.testing.assert_allclose(h["energy_error"], 0.0, atol=1e-9)
+    for name in ("shear_force", "shift", "friction_work"):
+        np.testing.assert_allclose(h[name], cycle.history[name], atol=0.05 * np.abs(cycle.history[name]).max())
+
+
 def test_growing_contact_of_dissimilar_bodies():
     states = scenes.growing_indentation(mu=0.3, elements=48, steps=24)
     h, exact = follow(states).history, states[-1].reference
