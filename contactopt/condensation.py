@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.body import Body
-from contactopt.linear import BodySolver, make_solver
+from contactopt.linear import BodySolver, System, make_solver
 
 KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body's stiffness is free
 
@@ -116,7 +116,7 @@ def reduce_body(body: Body, solver: str = "auto", schur: bool = True) -> Reduced
     interface = np.intersect1d(body.contact_dofs, body.free)
     A = body.A[body.free][:, body.free]
     last = place[interface] if schur else None
-    made = make_solver(solver, A, node[body.free], component[body.free], body.locations, last)
+    made = make_solver(solver, System(A, node[body.free], component[body.free], body.locations, last))
     extended = body.motion.copy()
     extended[body.free] -= made.solve((body.A @ body.motion)[body.free])
     K = extended.T @ (body.A @ extended)

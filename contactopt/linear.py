@@ -1,12 +1,7 @@
 """The linear system A x = b of one elastic body behind one seam: sparse factors or multigrid.
 
 A is the stiffness on the free displacement unknowns, symmetric positive definite. Every solver is made by a function
-of SOLVERS from
-
-    A          (n, n) sparse [force / length]
-    node       (n,) mesh node of each unknown;   component  (n,) its component, 0 .. dim - 1
-    points     (dim, nodes) coordinates of the mesh nodes
-    last       (m,) unknowns whose block of the inverse is asked for (the contact unknowns), or None
+of SOLVERS from a System.
 """
 
 from __future__ import annotations
@@ -17,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property
 from importlib.util import find_spec
 from itertools import count
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import scipy.linalg as la
@@ -32,6 +27,22 @@ from contactopt.scene import check_number
 RTOL = 1e-10  # default accuracy of an iterative solve
 SMALL = 20_000  # unknowns of a 3D body for which PARDISO is not worth its start
 LARGEST = {"superlu": 100_000, "pardiso": 200_000}  # unknowns of a 3D body that is factorised
+
+
+class System(NamedTuple):
+    """What the solvers of one body are made from.
+
+    A          (n, n) sparse [force / length]
+    node       (n,) mesh node of each unknown;   component  (n,) its component, 0 .. dim - 1
+    points     (dim, nodes) coordinates of the mesh nodes
+    last       (m,) unknowns whose block of the inverse is asked for (the contact unknowns), or None
+    """
+
+    A: sp.csr_matrix
+    node: np.ndarray
+    component: np.ndarray
+    points: np.ndarray
+    last: np.ndarray | None = None
 
 
 class BodySolver(Protocol):
@@ -56,23 +67,16 @@ class BodySolver(Protocol):
         """That block times `load`, (m,) or (m, j)."""
 
 
-def make_solver(
-    name: str,
-    A: sp.csr_matrix,
-    node: np.ndarray,
-    component: np.ndarray,
-    points: np.ndarray,
-    last: np.ndarray | None = None,
-) -> BodySolver:
-    """The solver `name`, a key of SOLVERS or 'auto'; arguments as in the head of this module.
+def make_solver(name: str, system: System) -> BodySolver:
+    """The solver `name`, a key of SOLVERS or 'auto', of a body.
 
     Raises InputError for an unknown name or a missing package.
     """
     if name == "auto":
-        name = choose(A.shape[0], len(points), find_spec("pypardiso") is not None)
+        name = choose(system.A.shape[0], len(system.points), find_spec("pypardiso") is not None)
     if name not in SOLVERS:
         raise InputError(f"unknown body solver {name!r}; choose from auto, {', '.join(SOLVERS)}.")
-    return SOLVERS[name](A, node, component, points, last)
+    return SOLVERS[name](system)
 
 
 def choose(n: int, dim: int, pardiso: bool = False) -> str:
@@ -94,17 +98,11 @@ class SuperLUSolver:
     name = "superlu"
     iterations = 0
 
-    def __init__(
-        self,
-        A: sp.csr_matrix,
-        node: np.ndarray,
-        component: np.ndarray,
-        points: np.ndarray,
-        last: np.ndarray | None = None,
-    ):
-        self.last = last
-        self.order = elimination_order(A, node, component, points, np.zeros(0, int) if last is None else last)
-        ordered = A[self.order][:, self.order].tocsc()
+    def __init__(self, system: System):
+        self.last = system.last
+        last = np.zeros(0, int) if system.last is None else system.last
+        self.order = elimination_order(*system[:4], last)
+        ordered = system.A[self.order][:, self.order].tocsc()
         home = _homes()[next(_TURN) % 2]
         self._held = [home.submit(_factors, ordered).result()]
         weakref.finalize(self, home.submit, self._held.clear).atexit = False
@@ -166,20 +164,13 @@ class PardisoSolver:
     name = "pardiso"
     iterations = 0
 
-    def __init__(
-        self,
-        A: sp.csr_matrix,
-        node: np.ndarray,
-        component: np.ndarray,
-        points: np.ndarray,
-        last: np.ndarray | None = None,
-    ):
+    def __init__(self, system: System):
         try:
             from pypardiso import PyPardisoSolver
         except ImportError as error:
             raise InputError("the body solver 'pardiso' needs the package pypardiso: pip install pypardiso.") from error
-        self.last = last
-        self.upper = sp.triu(A, format="csr")
+        self.last = system.last
+        self.upper = sp.triu(system.A, format="csr")
         self.factors = PyPardisoSolver(mtype=2)  # real, symmetric positive definite
         self.factors.factorize(self.upper)
         weakref.finalize(self, self.factors.free_memory, everything=True)  # MKL's memory is not Python's
@@ -222,17 +213,10 @@ class MultigridSolver:
 
     name = "multigrid"
 
-    def __init__(
-        self,
-        A: sp.csr_matrix,
-        node: np.ndarray,
-        component: np.ndarray,
-        points: np.ndarray,
-        last: np.ndarray | None = None,
-    ):
-        self.last = last
+    def __init__(self, system: System):
+        self.last = system.last
         self.iterations = 0
-        self.cycle = VCycle(A, node, component, points)
+        self.cycle = VCycle(*system[:4])
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         rtol = RTOL if rtol is None else rtol
@@ -291,7 +275,7 @@ def _block_product(solver: Any, n: int, load: np.ndarray, rtol: float | None) ->
     return np.asarray(solver.solve(full, rtol)[last])
 
 
-SOLVERS: dict[str, Callable[..., BodySolver]] = {
+SOLVERS: dict[str, Callable[[System], BodySolver]] = {
     "superlu": SuperLUSolver,
     "pardiso": PardisoSolver,
     "multigrid": MultigridSolver,

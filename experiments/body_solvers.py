@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 
 from contactopt import scenes
 from contactopt.body import build_body
-from contactopt.linear import RTOL, make_solver
+from contactopt.linear import RTOL, System, make_solver
 from contactopt.multigrid import nodal_blocks, rigid_motions
 from experiments.report import write
 
@@ -38,25 +38,25 @@ COLOURS = {"superlu": "#0072B2", "pardiso": "#009E73", "multigrid": "#D55E00", P
 GIB = 2**30
 
 
-def system(part: str, elements: int) -> tuple[Any, ...]:
-    """The arguments of a solver for one body of the 3D punch, and a random load on its contact unknowns."""
+def system(part: str, elements: int) -> tuple[System, np.ndarray]:
+    """What the solvers of one body of the 3D punch are made from, and a random load on its contact unknowns."""
     scene = scenes.flat_punch(3)
     body = build_body(scene, getattr(scene, part), elements, None)
     dofs, free = np.asarray(body.basis.nodal_dofs), body.free
     node, component = np.empty(len(body.load), int), np.empty(len(body.load), int)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
     load = np.random.default_rng(0).standard_normal(len(free)) * np.isin(free, body.contact_dofs)
-    return (body.A[free][:, free], node[free], component[free], body.basis.mesh.p), load
+    return System(body.A[free][:, free], node[free], component[free], body.basis.mesh.p), load
 
 
 class Plain:
     """Smoothed aggregation of the same blocks and rigid motions as pyamg does it by default."""
 
-    def __init__(self, A: Any, node: np.ndarray, component: np.ndarray, points: np.ndarray):
+    def __init__(self, system: System):
         import pyamg
 
-        blocks, self.place, present = nodal_blocks(A, node, component, len(points))
-        modes = rigid_motions(points[:, present])
+        blocks, self.place, present = nodal_blocks(*system[:3], len(system.points))
+        modes = rigid_motions(system.points[:, present])
         modes[np.setdiff1d(np.arange(len(modes)), self.place)] = 0.0
         self.hierarchy = pyamg.smoothed_aggregation_solver(blocks, modes)
         self.complexity = self.hierarchy.operator_complexity()
@@ -88,7 +88,7 @@ def measure(task: tuple[str, int]) -> dict[str, Any]:
     name, elements = task
     arguments, load = system("lower", elements)
     before = resident()
-    solver, setup = timed(lambda: Plain(*arguments) if name == PLAIN else make_solver(name, *arguments))
+    solver, setup = timed(lambda: Plain(arguments) if name == PLAIN else make_solver(name, arguments))
     memory = resident() - before
     solver.solve(load)
     x, seconds = timed(lambda: solver.solve(load))
@@ -102,7 +102,7 @@ def measure(task: tuple[str, int]) -> dict[str, Any]:
         "iterations": solver.iterations,
         "memory [MiB]": memory / 2**20,
         "complexity": getattr(cycle, "complexity", ""),
-        "residual": float(np.linalg.norm(load - arguments[0] @ x) / np.linalg.norm(load)),
+        "residual": float(np.linalg.norm(load - arguments.A @ x) / np.linalg.norm(load)),
     }
 
 
@@ -126,7 +126,7 @@ def both(elements: int) -> list[dict[str, Any]]:
     before = resident()
     rows = []
     with ThreadPoolExecutor(2) as pool:
-        made = list(pool.map(lambda s: watched(lambda: make_solver("multigrid", *s[0])), systems))
+        made = list(pool.map(lambda s: watched(lambda: make_solver("multigrid", s[0])), systems))
         solvers = [solver for solver, _ in made]
         solved = list(pool.map(lambda p: watched(lambda: p[0].solve(p[1][1])), zip(solvers, systems)))
     memory, peak = resident() - before, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024

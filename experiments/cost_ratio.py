@@ -14,7 +14,7 @@ import scipy.sparse as sp
 
 from contactopt import Scene, scenes, solve
 from contactopt.body import Body, build_body
-from contactopt.linear import make_solver
+from contactopt.linear import System, make_solver
 from contactopt.reduction import reduce_bodies
 from experiments.report import merged, write
 
@@ -58,7 +58,7 @@ def bonded(upper: Body, lower: Body, solver: str) -> Callable[[], np.ndarray]:
     A = A[free][:, free].tocsr()
 
     def act() -> np.ndarray:
-        return make_solver(solver, A, free // dim, free % dim, points).solve(load[free])
+        return make_solver(solver, System(A, free // dim, free % dim, points)).solve(load[free])
 
     return act
 
