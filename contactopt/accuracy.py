@@ -9,10 +9,11 @@ whatever size the mesh function holds fixed. The error is taken as one part that
 
 both read from differences of nested solutions (Richardson): the first of the meshes for n, 2 n, 4 n elements, the
 second of the last of them and its split, measured anew on the mesh that it asks to split. Their sizes are added, the
-larger part is refined next. Orders are observed where there are three solutions, and held between 3/4 and 2 per degree
-of the displacement, the order of functionals of smooth solutions, or 2 where an edge is read, since the solution is not
-smooth there. Not estimated, because no refinement shows it: what finite bodies differ from half-spaces, and the steps
-of a load path.
+larger part is refined next. A value read between nodes is as uncertain as its readings from two sides differ, whatever
+the sum says. Orders are observed where there are three solutions, and held between 3/4 and 2 per degree of the
+displacement, the order of functionals of smooth solutions, or 2 where an edge is read, since the solution is not smooth
+there. Not estimated, because no refinement shows it: what finite bodies differ from half-spaces, and the steps of a
+load path.
 
 Source: Roache (1998), Verification and Validation in Computational Science and Engineering, chapter 5.
 """
@@ -31,7 +32,7 @@ from contactopt.driver import solve
 from contactopt.errors import InputError
 from contactopt.paths import PathResult, follow
 from contactopt.problem import Solution
-from contactopt.quantities import QUANTITIES, at_rim
+from contactopt.quantities import QUANTITIES, at_rim, uncertainty
 from contactopt.reduction import Reduction, reduce_bodies
 from contactopt.refinement import split_scene
 from contactopt.scene import Part, Scene, check_number
@@ -48,7 +49,7 @@ STUCK = 0.1  # order below which a sequence does not converge
 
 @dataclass(frozen=True)
 class Level:
-    """One solve of the sequence. `zone` is the half-width that the mesh resolves [length], None without a zone loop."""
+    """One solve. `zone`: half-width that the mesh resolves [length], None without a zone loop; `uncertainty` of the value."""
 
     elements: int
     splits: int
@@ -57,6 +58,7 @@ class Level:
     rounds: int
     zone: float | None
     value: float
+    uncertainty: float
     seconds: float
 
 
@@ -65,7 +67,7 @@ class Estimate:
     """What is known of a quantity after the last solve.
 
     value         on the last mesh;  extrapolated: less the estimated error
-    error         estimated, relative to the value;  mesh_error, grading_error: its two parts, signed; None where unknown
+    error         estimated, relative to the value: mesh_error and grading_error, signed; at least the uncertainty; None: unknown
     order         observed of the first part, None if the sequence is not monotone
     reached       whether error <= target;  message: one sentence;  levels: in the order they were solved
     """
@@ -123,19 +125,20 @@ def refine(
     search = _Search(tuple(states), quantity, note, {"Q": Q, "solver": solver}, settings)
     while True:
         mesh, order, grading = *search.mesh_error(), search.grading_error()
-        error = (abs(mesh) + abs(grading)) / (abs(search.meshes[-1].value) or 1.0)
+        read, scale = search.meshes[-1].uncertainty, abs(search.meshes[-1].value) or 1.0
+        error = max(abs(mesh) + abs(grading), read) / scale
         message = in_vain = search.obstacle()
         if in_vain or error <= accuracy:
             break
         note(f"{quantity} {search.meshes[-1].value:.6g}, estimated error {error:.1e}")
-        message = search.finer_grading() if abs(grading) > abs(mesh) else search.finer_mesh()
+        message = search.finer_grading() if abs(grading) > max(abs(mesh), read) else search.finer_mesh()
         if message:
             break
     last = search.final()
     message = message or last.failure
     coarse = sum(level.seconds for level in search.levels) - last.level.seconds
     last = replace(last, solution=replace(last.solution, seconds=last.solution.seconds | {"coarse": coarse}))
-    value, scale = last.level.value, abs(search.meshes[-1].value) or 1.0
+    value = last.level.value
     parts: dict[str, Any] = dict.fromkeys(("extrapolated", "error", "mesh_error", "grading_error", "order"))
     if not in_vain and np.isfinite(error):
         parts = dict(zip(parts, (value - mesh - grading, error, mesh / scale, grading / scale, order)))
@@ -278,10 +281,9 @@ class _Search:
         else:
             path = None
             reduction, solution, zones = self._zone_loop(states[0], elements)
-        value = QUANTITIES[self.quantity](reduction, solution)
-        size = reduction.dofs, reduction.problem.contacts, max(1, len(zones) - 1)
-        zone = zones[-2] if zones else None
-        self.levels.append(Level(elements, splits, *size, zone, value, time.perf_counter() - begin))
+        value = QUANTITIES[self.quantity](reduction, solution), uncertainty(self.quantity, reduction, solution)
+        size = reduction.dofs, reduction.problem.contacts, max(1, len(zones) - 1), zones[-2] if zones else None
+        self.levels.append(Level(elements, splits, *size, *value, time.perf_counter() - begin))
         return Solved(self.levels[-1], reduction, solution, tuple(zones), path)
 
     def _zone_loop(self, scene: Scene, elements: int) -> tuple[Reduction, Solution, list[float]]:

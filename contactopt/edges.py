@@ -35,14 +35,16 @@ def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
     return edge.clip(read)
 
 
-def stick_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray, slip: np.ndarray | None = None) -> float:
-    """Half-width of a stick zone about x = 0 [length]; where it is no such zone, by its area.
+def stick_edge(
+    scene: Scene, problem: InterfaceProblem, reactions: np.ndarray, slip: np.ndarray | None = None
+) -> tuple[float, float]:
+    """Half-width of a stick zone about x = 0 and its uncertainty [length]; where it is no such zone, by its area.
 
     slip  (k, dim - 1) of the step that led to the reactions [length], if known
     The slack counts towards the direction in which the nearest slipping node slips. Where contact ends at a corner, the
     pressure is singular: the slack relative to its bound stays smooth but not straight, so that near values serve best, and
-    the mean of what the slack inside and the slip outside read. Small steps of a path slip otherwise: their reading, off by more
-    than an element, is left out.
+    the mean of what the slack inside and the slip outside read, which is as uncertain as they differ. Small steps of a path
+    slip otherwise: their reading, off by more than an element, is left out.
     """
     touching, inside = pressed(reactions), stuck(reactions, problem.mu)
     found, edge = list[float](), _Edge.of(problem, inside)
@@ -58,7 +60,7 @@ def stick_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray, s
                 reads.append(edge.outer(np.linalg.norm(slip, axis=1), NEAR))
             found = [read for read in reads if read is not None and edge.clip(read) == read]
     width = float(np.mean(found)) if found else stick_half_width(scene, problem, reactions)
-    return min(width, contact_edge(scene, problem, reactions))
+    return min(width, contact_edge(scene, problem, reactions)), float(np.ptp(found)) / 2 if found else 0.0
 
 
 def _directions(problem: InterfaceProblem, r_t: np.ndarray, slipping: np.ndarray) -> np.ndarray:

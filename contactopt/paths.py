@@ -246,7 +246,7 @@ def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
         "approach": -float(state.apart[0]),
         "shift": float(state.apart[1]),
         "contact_half_width": contact_edge(state.scene, problem, r),
-        "stick_half_width": stick_edge(state.scene, problem, r, state.slip),
+        "stick_half_width": stick_edge(state.scene, problem, r, state.slip)[0],
         "contact_nodes": int(touching.sum()),
         "stick_nodes": int(sticking.sum()),
         "slip_nodes": int((touching & ~sticking).sum()),

@@ -127,14 +127,16 @@ def width(reduction: Reduction, solution: Solution) -> float:
     return contact_edge(reduction.scene, problem, r)
 
 
-def _stick_ratio(reduction: Reduction, solution: Solution) -> float:
+def stick_ratio(reduction: Reduction, solution: Solution) -> tuple[float, float]:
+    """Half-width of the stick zone over that of contact [-], and its uncertainty: read between nodes."""
     from contactopt.edges import contact_edge, stick_edge
 
     problem = reduction.problem
     given = reduction.scene, problem, solution.reactions
     edge = contact_edge(*given)
     slip = problem.displacements(solution.reactions, solution.multipliers)[:, 1:]
-    return stick_edge(*given, slip) / edge if edge > 0 else 0.0
+    stick, uncertainty = stick_edge(*given, slip)
+    return (stick / edge, uncertainty / edge) if edge > 0 else (0.0, 0.0)
 
 
 def _approach(reduction: Reduction, solution: Solution) -> float:
@@ -144,11 +146,16 @@ def _approach(reduction: Reduction, solution: Solution) -> float:
     return value
 
 
+def uncertainty(name: str, reduction: Reduction, solution: Solution) -> float:
+    """Of the value itself, in its unit: nonzero where it is read between nodes, in two ways that may differ."""
+    return stick_ratio(reduction, solution)[1] if name == "stick" else 0.0
+
+
 # name -> function of a reduction and its solution
 QUANTITIES: dict[str, Callable[[Reduction, Solution], float]] = {
     "pressure": peak_pressure,
     "width": width,
     "approach": _approach,
-    "stick": _stick_ratio,
+    "stick": lambda *solved: stick_ratio(*solved)[0],
     "energy": elastic_energy,
 }

@@ -171,7 +171,7 @@ def _summary(
         "normal_force": float(r[:, 0].sum()),
         "approach": approach(problem, solution),
         "contact_half_width": float(width),
-        "stick_half_width": min(float(width), stick_edge(scene, problem, r, slip)),
+        "stick_half_width": min(float(width), stick_edge(scene, problem, r, slip)[0]),
         "max_pressure": float((r[:, 0] / problem.areas).max()),
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,

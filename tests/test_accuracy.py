@@ -230,6 +230,23 @@ def test_effectivity_at_a_singular_edge(mu):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("mu", [0.3, 0.5])
+@pytest.mark.parametrize("kind", ["axisymmetric", "plane-strain"])
+def test_effectivity_of_the_stick_ratio(kind, mu):
+    row = effectivity(scenes.rigid_punch(kind, mu=mu), "stick", 1e-2)
+    assert abs(row["true error"]) <= 1e-2 and 0.5 <= row["effectivity"] <= 4
+
+
+@pytest.mark.slow
+def test_a_few_nodes_of_stick_are_not_taken_for_certain():
+    scene = scenes.rigid_punch(mu=0.1)  # c / a = .036
+    _, estimate = refine([scene], "stick", 1e-2)
+    last = estimate.levels[-1]
+    assert last.uncertainty > 0 and estimate.error >= last.uncertainty / last.value * (1 - 1e-12)
+    assert estimate.error >= 0.5 * abs(estimate.value / exact(scene)["stick"] - 1)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["axisymmetric", "plane-strain"])
 def test_hertz_within_a_thousandth_on_5000_unknowns(kind):
     scene = indenter(kind)
