@@ -35,7 +35,7 @@ from contactopt.problem import Solution
 from contactopt.quantities import QUANTITIES, at_rim, uncertainty
 from contactopt.reduction import Reduction, reduce_bodies
 from contactopt.refinement import split_scene
-from contactopt.scene import Part, Scene, check_number
+from contactopt.scene import Scene, check_number
 from contactopt.warm import transfer
 from contactopt.zone import AGREE, LOOPS, contact_half_width, pressed
 
@@ -175,7 +175,7 @@ class _Search:
     def __init__(self, states, quantity, note, forms, settings):  # type: ignore[no-untyped-def]
         self.states, self.quantity, self.note, self.forms, self.settings = states, quantity, note, forms, settings
         scene = states[-1]
-        self.given = not all(callable(part.mesh) for part in (scene.upper, scene.lower) if isinstance(part, Part))
+        self.given = scene.given
         self.first = scene.elements if self.given else max(COARSEST[scene.dim], scene.elements // BELOW)
         self.best = 2 if quantity in EDGES else 2 * scene.degree
         self.levels: list[Level] = []

@@ -34,6 +34,7 @@ from contactopt.problem import InterfaceProblem
 from contactopt.scene import Part, Scene
 
 PRODUCTS = 60  # with Q, of a solve from cold
+SOLVE = {2: 3.0, 3: 0.4}  # time of an operation of a product over one of the elimination, by dimension: measured
 DENSE = 10  # speed of dense linear algebra over that of a sparse factorisation
 LARGEST = 8000  # interface unknowns of an explicit Q: half a gigabyte
 
@@ -162,13 +163,13 @@ def form_of(m: int, n: int, dim: int, iterative: bool) -> str:
 
     m unknowns on the contact boundary, n unknowns of the larger body, `iterative` if it has no factors.
     Explicit: m^3 / 3 to eliminate the contact unknowns last, at the speed of a sparse factorisation, and about 3 m^3 for the
-    inverse and Newton's steps at DENSE times that speed. Implicit: PRODUCTS solves of 4 operations per entry of the
-    factors, of which nested dissection leaves 4 n log2 n in 2D and 17 n^(4/3) in 3D (fitted to our bodies). Bodies without
-    factors would need m solves for an explicit Q, which never pays, nor does an array larger than LARGEST.
+    inverse and Newton's steps at DENSE times that speed. Implicit: PRODUCTS solves of 4 operations, at the price SOLVE, per
+    entry of the factors, of which nested dissection leaves 4 n log2 n in 2D and 17 n^(4/3) in 3D (fitted to our bodies).
+    Bodies without factors would need m solves for an explicit Q, which never pays, nor does an array larger than LARGEST.
     """
     explicit = m**3 / 3 + 3 * m**3 / DENSE
     entries = 4 * n * np.log2(n) if dim == 2 else 17 * n ** (4 / 3)
-    return "implicit" if iterative or m > LARGEST or explicit > 4 * PRODUCTS * entries else "explicit"
+    return "implicit" if iterative or m > LARGEST or explicit > 4 * PRODUCTS * SOLVE[dim] * entries else "explicit"
 
 
 def both(act: Callable[[Any], Any], bodies: Sequence[Any]) -> tuple[Any, Any]:

@@ -191,6 +191,11 @@ class Scene:
     def dim(self) -> int:
         return len(self.components)
 
+    @property
+    def given(self) -> bool:
+        """Whether the mesh of a body is given, not made for a number of elements."""
+        return any(isinstance(part, Part) and not callable(part.mesh) for part in (self.upper, self.lower))
+
     def _check_part(self, part: Part | Rigid) -> None:
         if isinstance(part, Rigid):
             self._check_components(part.name, part.force or {})

@@ -12,6 +12,7 @@ import numpy as np
 
 from contactopt.driver import solve
 from contactopt.errors import InputError
+from contactopt.operators import InterfaceOperator
 from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.reduction import Reduction, reduce_bodies
 from contactopt.scene import Scene
@@ -21,6 +22,7 @@ FIT = 4  # nodes next to the edge through which p^2 is extrapolated
 AGREE = 0.05  # two zones agree when they differ by less than this fraction of an element
 LOOPS = 10
 COARSEST = 4  # elements across the contact half-width of the first of nested meshes
+FACTOR = {2: 8, 3: 4}  # coarser than the next of them, where bodies are factorised: a 64th of the unknowns
 ROUGH = 1e-6  # certificate asked of a coarse mesh: its own error is larger
 
 Note = Callable[[str], None]
@@ -85,8 +87,8 @@ def solve_zone(
     Each round solves on meshes with a node at the present zone's edge and reads the new edge from the reactions; two
     zones agree when they differ by a twentieth of an element. Returns the last reduction and solution with the zones
     tried, the last of them the result, none if there is no loop; `seconds` are summed over the rounds, each of which starts
-    from the one before. Q and solver go to reduce(), settings to solve(). Where bodies are solved by iteration, the first
-    start is the solution on meshes half as fine.
+    from the one before. Q and solver go to reduce(), settings to solve(). Where Q is known by its products, the first start
+    is the solution on coarser meshes, if the bodies can make them.
     """
     elements = scene.elements if elements is None else elements
     seconds: Counter[str] = Counter()
@@ -95,8 +97,10 @@ def solve_zone(
     while True:
         note(f"reducing {scene.name}" + (f", zone {zones[-1]:.6g}" if zones else ""))
         reduction = reduce_bodies(scene, elements, zones[-1] if zones else None, Q, solver)
-        if previous is None and reduction.iterative and elements >= 2 * COARSEST:
-            previous = _coarse(scene, elements // 2, note, settings, seconds)
+        coarser = elements // (2 if reduction.iterative else FACTOR[scene.dim])
+        implicit = isinstance(reduction.problem.Q, InterfaceOperator)
+        if previous is None and implicit and not scene.given and coarser >= COARSEST:
+            previous = _coarse(scene, coarser, note, settings, seconds)
         note(f"solving {reduction.problem.contacts} contacts")
         start = None if previous is None else transfer(*previous, reduction.problem)
         solution = solve(reduction.problem, start=start, **settings)
@@ -118,7 +122,7 @@ def solve_zone(
 def _coarse(
     scene: Scene, elements: int, note: Note, settings: dict[str, Any], seconds: Counter[str]
 ) -> tuple[InterfaceProblem, Solution]:
-    """The problem on coarser meshes and its solution, itself started from a coarser one where bodies need iteration."""
+    """The problem on coarser meshes and its solution, itself started from a coarser one where Q is known by its products."""
     rough = settings | {"tol": max(ROUGH, settings.get("tol", 0.0))}
     begin = time.perf_counter()
     reduction, solution, _ = solve_zone(replace(scene, zone=None), elements, note, **rough)

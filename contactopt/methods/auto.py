@@ -27,6 +27,7 @@ from contactopt.methods import NATIVE, Iterate
 from contactopt.methods.cone import AcaryCadoux
 from contactopt.methods.newton import Newton
 from contactopt.methods.proximal import Proximal
+from contactopt.operators import InterfaceOperator
 from contactopt.preconditioners import find_preconditioner
 from contactopt.problem import InterfaceProblem
 
@@ -67,14 +68,16 @@ class Auto:
     def _newton(
         problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
     ) -> Generator[Iterate, None, Iterate]:
-        """Newton's iterates; returns the best."""
+        """Newton's iterates; returns the best. What comes next needs the entries of Q: not before they cost no more."""
         best, reached, since = np.inf, start, 0
+        operator = problem.Q if isinstance(problem.Q, InterfaceOperator) else None
         for steps, (point, residual) in enumerate(Newton(preconditioner=preconditioner).steps(problem, start)):
             yield point
             since = 0 if residual < PROGRESS * best else since + 1
             if residual < best:
                 best, reached = residual, point
-            if since >= PATIENCE or steps >= LIMIT:
+            tired = since >= PATIENCE or steps >= LIMIT
+            if tired and (operator is None or operator.products >= problem.q.size):
                 break
         return reached or cold_start(problem)
 
