@@ -14,7 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.body import Body
-from contactopt.linear import BodySolver, System, make_solver
+from contactopt.factors import Product, System
+from contactopt.linear import BodySolver, make_solver
 
 KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body's stiffness is free
 
@@ -45,6 +46,10 @@ class ReducedBody:
         return self.solver.trailing_inverse()
 
     @cached_property
+    def _restricted(self) -> Product:
+        return self.solver.restricted(np.searchsorted(self.body.free, self.interface))
+
+    @cached_property
     def motions(self) -> np.ndarray:
         """(n, p) displacement fields of the free plate motions."""
         return np.asarray(self.extended @ self.modes[0])
@@ -62,11 +67,10 @@ class ReducedBody:
         return out
 
     def contact_motion(self, force: np.ndarray, accuracy: float | None = None) -> np.ndarray:
-        """As elastic() under forces on the interface alone, right there and, where it is cheaper, zero elsewhere."""
-        if self.solver.last is None:
-            return self.elastic(force, accuracy)
+        """As elastic() under forces on the interface alone, right there, zero elsewhere."""
         out = np.zeros(force.shape)
-        out[self.interface] = self.solver.trailing_product(force[self.interface], accuracy)
+        act = self._restricted if self.solver.last is None else self.solver.trailing_product
+        out[self.interface] = act(force[self.interface], accuracy)
         if self.soft.shape[1]:
             out += self.soft @ (self.soft.T @ force)
         return out

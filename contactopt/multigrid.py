@@ -50,7 +50,7 @@ class VCycle:
 
     scale    (n,) s = diag(A)^-1/2;   A  (n, n) the scaled diag(s) A diag(s)
     levels   finest first;   coarsest  the inverse of the last level's matrix
-    Arguments as in contactopt.linear. Raises InputError if the package pyamg is missing.
+    Arguments as in contactopt.factors.System. Raises InputError if the package pyamg is missing.
     """
 
     def __init__(self, A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, points: np.ndarray):

@@ -21,7 +21,8 @@ from matplotlib.figure import Figure
 
 from contactopt import scenes
 from contactopt.body import build_body
-from contactopt.linear import RTOL, System, make_solver
+from contactopt.factors import System
+from contactopt.linear import RTOL, make_solver
 from contactopt.multigrid import nodal_blocks, rigid_motions
 from experiments.report import write
 

@@ -14,7 +14,8 @@ import scipy.sparse as sp
 
 from contactopt import Scene, scenes, solve
 from contactopt.body import Body, build_body
-from contactopt.linear import System, make_solver
+from contactopt.factors import System
+from contactopt.linear import make_solver
 from contactopt.reduction import reduce_bodies
 from experiments.report import merged, write
 

@@ -10,7 +10,7 @@ import contactopt
 ROOT = Path(contactopt.__file__).parent
 ORDER = [
     "errors", "scene", "analytic.reference", "analytic.normal", "analytic.panels", "analytic.spence", "analytic.friction",
-    "analytic.mindlin", "analytic.corner", "analytic", "mesh", "disc", "scenes.common", "scenes.flat", "scenes.round", "scenes.sliding", "scenes", "elements", "refinement", "body", "dissection", "multigrid", "linear", "cones", "operators", "problem", "semismooth", "bonded", "cosine", "preconditioners", "krylov", "alart_curnier", "subproblems",
+    "analytic.mindlin", "analytic.corner", "analytic", "mesh", "disc", "scenes.common", "scenes.flat", "scenes.round", "scenes.sliding", "scenes", "elements", "refinement", "body", "dissection", "multigrid", "factors", "linear", "cones", "operators", "problem", "semismooth", "bonded", "cosine", "preconditioners", "krylov", "alart_curnier", "subproblems",
     "balance", "mprgp", "models", "backends", "backends.qp", "backends.conic", "backends.direct", "splitting", "methods",
     "methods.alternating", "methods.tresca", "methods.cone", "methods.apg", "methods.nsgs", "methods.admm",
     "methods.lagrangian", "methods.complementarity", "methods.newton", "methods.proximal",

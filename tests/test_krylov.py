@@ -7,13 +7,14 @@ import pytest
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, reduce_bodies, run, scenes, solve
 from contactopt.alart_curnier import coulomb_equations
+from contactopt.factors import SuperLUSolver
 from contactopt.krylov import krylov_step, model_of
-from contactopt.linear import SuperLUSolver
 from contactopt.operators import InterfaceOperator, block, estimate_diagonal, nodal_weights
 from contactopt.problem import dimensionless
 from contactopt.reduction import form_of
 from contactopt.scenes import make_scene
 from contactopt.subproblems import KrylovSubproblem
+from contactopt.zone import solve_zone
 
 SMALL = {"punch-2d": 16, "sphere": 12, "punch-3d": 4}
 
@@ -165,6 +166,22 @@ def test_the_form_is_chosen_by_cost():
         assert chosen == sorted(chosen) and len(set(chosen)) == 2
     with pytest.raises(InputError, match="choose from auto, explicit, implicit"):
         reduce(scenes.flat_punch(2, elements=4), Q="dense")
+
+
+def test_products_start_from_a_coarse_mesh_if_there_is_one():
+    scene = scenes.flat_punch(2, elements=64)
+    _, explicit, _ = solve_zone(scene, Q="explicit")
+    _, nested, _ = solve_zone(scene, Q="implicit")
+    assert nested.solved and "coarse" in nested.seconds and "coarse" not in explicit.seconds
+    np.testing.assert_allclose(nested.reactions, explicit.reactions, atol=1e-6 * np.abs(explicit.reactions).max())
+
+    def fixed(part):
+        return replace(part, mesh=part.build_mesh(64, None))
+
+    given = replace(scene, upper=fixed(scene.upper), lower=fixed(scene.lower))
+    _, alone, _ = solve_zone(given, Q="implicit")
+    assert given.given and not scene.given
+    assert alone.solved and "coarse" not in alone.seconds  # a coarser mesh would be the same
 
 
 def test_iterative_bodies_start_from_nested_meshes(tmp_path):

@@ -12,7 +12,8 @@ from scipy.sparse.linalg import spsolve
 from contactopt import multigrid, reduce, scenes
 from contactopt.body import build_body
 from contactopt.errors import BackendError, InputError
-from contactopt.linear import LARGEST, SMALL, SOLVERS, System, choose, make_solver
+from contactopt.factors import System
+from contactopt.linear import LARGEST, SMALL, SOLVERS, choose, make_solver
 from contactopt.multigrid import near_neighbours, rigid_motions
 
 
@@ -31,6 +32,7 @@ def bodies():
     plane, ring, solid = scenes.flat_punch(2), scenes.sphere(), scenes.flat_punch(3)
     return {
         "plane": system(plane, plane.lower, 16),
+        "fine punch": system(plane, plane.upper, 64),  # entries of its factors vanish
         "axisymmetric": system(ring, ring.upper, 8),
         "solid punch": system(solid, solid.upper, 5),
         "solid foundation": system(solid, solid.lower, 3),
@@ -173,6 +175,22 @@ def test_the_order_of_the_trailing_unknowns_is_the_callers(name):
     shuffled = np.random.default_rng(0).permutation(len(last))
     C, D = (made(name, System(*system, chosen)).trailing_inverse() for chosen in (last, last[shuffled]))
     assert np.abs(C[np.ix_(shuffled, shuffled)] - D).max() <= 1e-12 * np.abs(C).max()
+
+
+@pytest.mark.parametrize("body", ["plane", "fine punch", "axisymmetric", "solid punch"])
+@pytest.mark.parametrize("name", SOLVERS)
+def test_restricted_products_are_those_of_the_block(name, body):
+    system = BODIES[body]
+    solver = made(name, System(*system[:4]))
+    at = np.random.default_rng(1).permutation(system.last)
+    act = solver.restricted(at)
+    limit = 1e-8 if name == "multigrid" else 1e-11
+    for load in (np.ones(len(at)), np.random.default_rng(0).standard_normal((len(at), 3)), np.zeros((len(at), 0))):
+        full = np.zeros((system.A.shape[0], *load.shape[1:]))
+        full[at] = load
+        expected = made("superlu", system).solve(full)[at]
+        assert act(load, None).shape == load.shape
+        assert np.linalg.norm(act(load, None) - expected) <= limit * np.linalg.norm(expected)
 
 
 def test_choice_of_a_solver():

@@ -60,6 +60,7 @@ MODULES = {
     "models": "Convex programs in cvxpy",
     "operators": "The interface operator by its products",
     "preconditioners": "Preconditioners",
+    "factors": "Factors of the bodies",
     "linear": "Solvers of the bodies",
     "cones": "Cones and projections",
     "recover": "Displacements and stresses",
