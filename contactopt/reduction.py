@@ -34,7 +34,7 @@ from contactopt.problem import InterfaceProblem
 from contactopt.scene import Part, Scene
 
 PRODUCTS = 60  # with Q, of a solve from cold
-SOLVE = {2: 3.0, 3: 0.4}  # time of an operation of a product over one of the elimination, by dimension: measured
+SOLVE = {2: 1.2, 3: 0.4}  # time of an operation of a product over one of the elimination, by dimension: measured
 DENSE = 10  # speed of dense linear algebra over that of a sparse factorisation
 LARGEST = 8000  # interface unknowns of an explicit Q: half a gigabyte
 
