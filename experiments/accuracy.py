@@ -297,7 +297,8 @@ the named scenes. Rows: the run that a target led to; a stricter target that was
 was not reached, the next mesh would have had more than 400,000 unknowns. The edge of stick lies between nodes: read from the
 nodes next to it, it jumps by a fraction of an element from mesh to mesh, and estimates were up to twenty times the error;
 read from the slack and the slip an element further, on both sides of it, its error falls smoothly enough.
-The difference of the two readings is the least estimate: where the stick zone is a few nodes wide (mu = .1 in the plane) it is all of it.
+The difference of the two readings is the least estimate: where the stick zone is a few nodes wide (mu = .1 in the plane)
+it is all of it.
 
 {{effectivity}}
 

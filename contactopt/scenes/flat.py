@@ -115,7 +115,8 @@ def rigid_punch(
     half-space is a block clamped below, `foundation` high and wide from the axis: 10,000 half-widths in plane strain,
     where its size stretches the contact by a strain ~ half_width / foundation, 1,000 radii of a disc (approach .2 % too
     small). Elements shrink to 1e-3 of the half-width towards the punch's edge, where the tractions are singular, and
-    displacements are quadratic: linear ones need twice the unknowns for thrice the error of the stick zone.
+    displacements are quadratic: the stick zone of linear ones, as many unknowns, is three times as far off
+    (reports/accuracy.md).
     sizes in mm, force in N; elements across the half-width; depth of the strip
     """
     if kind not in LARGE:
