@@ -92,7 +92,8 @@ class SuperLUSolver:
     def restricted(self, at: np.ndarray) -> Product:
         """By the part of L D L' that a load on `at` reaches: these unknowns and their ancestors in the elimination tree.
 
-        In the plane a third of the entries; in 3D more than half, and to copy them costs more than it saves.
+        In the plane few separators touch the contact; in 3D those that do hold most of the entries, and to copy them costs
+        more than it saves.
         """
         factors, n = self.factors, len(self.order)
         if not self.plane or not np.array_equal(factors.perm_c, factors.perm_r):
