@@ -15,40 +15,51 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from contactopt.analysis.diagnosis import Diagnosis, diagnose
+    from contactopt.analysis.enumeration import all_solutions
+    from contactopt.analysis.paths import PathResult, follow
     from contactopt.analytic import Reference
-    from contactopt.diagnosis import Diagnosis, diagnose
-    from contactopt.driver import solve
-    from contactopt.enumeration import all_solutions
     from contactopt.errors import BackendError, InputError
-    from contactopt.paths import PathResult, follow
+    from contactopt.interface.recovery import Fields
+    from contactopt.interface.reduction import reduce, reduce_bodies
+    from contactopt.material import Material
     from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
-    from contactopt.recover import Fields
-    from contactopt.reduction import reduce, reduce_bodies
+    from contactopt.problem.transfer import transfer
     from contactopt.runner import Result, run
-    from contactopt.scene import BodyForce, Material, Part, Plate, Rigid, Scene, Support, Traction
-    from contactopt.warm import transfer
+    from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
+    from contactopt.solving.driver import solve
 
+# name -> the module that it stands in
 _HOMES = {
     "analytic": ("Reference",),
-    "driver": ("solve",),
-    "diagnosis": ("Diagnosis", "diagnose"),
-    "enumeration": ("all_solutions",),
+    "analysis.diagnosis": ("Diagnosis", "diagnose"),
+    "analysis.enumeration": ("all_solutions",),
+    "analysis.paths": ("PathResult", "follow"),
     "errors": ("BackendError", "InputError"),
-    "paths": ("PathResult", "follow"),
+    "interface.recovery": ("Fields",),
+    "interface.reduction": ("reduce", "reduce_bodies"),
     "problem": ("InterfaceProblem", "Solution", "Status", "natural_map_residual"),
-    "recover": ("Fields",),
-    "reduction": ("reduce", "reduce_bodies"),
+    "problem.transfer": ("transfer",),
     "runner": ("Result", "run"),
-    "warm": ("transfer",),
-    "scene": ("BodyForce", "Material", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
+    "material": ("Material",),
+    "scenes.scene": ("BodyForce", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
+    "solving.driver": ("solve",),
 }
-_MODULES = ("analytic", "animation", "benchmark", "fclib", "models", "plots", "scenes")
+_MODULES = {
+    "analytic": "analytic",
+    "animation": "figures.animation",
+    "benchmark": "benchmark",
+    "fclib": "fclib",
+    "models": "models",
+    "plots": "figures.plots",
+    "scenes": "scenes",
+}
 __all__ = sorted([*(name for names in _HOMES.values() for name in names), *_MODULES])
 
 
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
-        return import_module(f"contactopt.{name}")
+        return import_module(f"contactopt.{_MODULES[name]}")
     for module, names in _HOMES.items():
         if name in names:
             return getattr(import_module(f"contactopt.{module}"), name)

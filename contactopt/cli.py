@@ -11,14 +11,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from contactopt.backends import CONIC, QP
+from contactopt.analysis.quantities import QUANTITIES
+from contactopt.bodies.solvers import SOLVERS
 from contactopt.errors import InputError
-from contactopt.linear import SOLVERS
-from contactopt.methods import METHODS, NATIVE
-from contactopt.operators import FORMS
-from contactopt.preconditioners import PRECONDITIONERS
-from contactopt.quantities import QUANTITIES
+from contactopt.problem.operators import FORMS
 from contactopt.scenes import PATHS, SCENES
+from contactopt.solving.backends import CONIC, QP
+from contactopt.solving.methods import METHODS, NATIVE
+from contactopt.solving.preconditioners import PRECONDITIONERS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -181,7 +181,7 @@ def _list(options: argparse.Namespace) -> int:
     print("forms of the interface operator Q: " + ", ".join(FORMS))
     print("solvers of the bodies: auto, " + ", ".join(SOLVERS))
     print("preconditioners of the interface operator")
-    for name, (_, what) in PRECONDITIONERS.items():
+    for name, (_, _, what) in PRECONDITIONERS.items():
         print(f"  {name:20} {what}")
     for title, table in (("QP backends (normal; tangential in 2D)", QP), ("conic backends (tangential in 3D)", CONIC)):
         print(title)

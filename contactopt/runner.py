@@ -14,19 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.accuracy import Estimate, refine
-from contactopt.edges import contact_edge, stick_edge
+from contactopt.analysis.accuracy import Estimate, refine
+from contactopt.analysis.edges import contact_edge, stick_edge
+from contactopt.analysis.paths import PathResult, follow
+from contactopt.analysis.quantities import approach
+from contactopt.analysis.zone import solve_zone
 from contactopt.errors import InputError
-from contactopt.methods import default_method, find_method
-from contactopt.operators import InterfaceOperator
-from contactopt.paths import PathResult, follow
+from contactopt.interface.recovery import Fields, recover
+from contactopt.interface.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.quantities import approach
-from contactopt.recover import Fields, recover
-from contactopt.reduction import Reduction
-from contactopt.scene import Scene
+from contactopt.problem.operators import InterfaceOperator
 from contactopt.scenes import PATHS, make_path, make_scene
-from contactopt.zone import solve_zone
+from contactopt.scenes.scene import Scene
+from contactopt.solving.methods import default_method, find_method
 
 Note = Callable[[str], None]
 PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work")
@@ -86,10 +86,10 @@ def run(
     scene     a name (see contactopt.scenes.SCENES), `changes` to its arguments, with its load path if it has one
               (PATHS); or a Scene, `changes` to its fields
     method, normal, tangential   names; by default `auto`, or `alternating` if a backend is named
-    preconditioner   of methods that take products with Q, a name in contactopt.preconditioners; selects Q = 'implicit'
+    preconditioner   of methods that take products with Q, a name in contactopt.solving.preconditioners; selects Q = 'implicit'
     Q, solver  form of Q and solver of the bodies, see reduce()
     elements  across the contact half-width;  tol  bound on the natural-map residual;  note  receives progress messages
-    accuracy  bound on the estimated relative error of `quantity`, a name in contactopt.quantities.QUANTITIES: meshes are then
+    accuracy  bound on the estimated relative error of `quantity`, a name in contactopt.analysis.quantities.QUANTITIES: meshes are then
               refined until it is met or a sentence says why not (Result.estimate); `elements` only scales the first mesh
     Raises InputError with a sentence that says what to do; nothing is left half-written.
     """
@@ -245,7 +245,7 @@ def _draw(result: Result, folder: Path) -> None:
     picture.figure.savefig(folder / "deformed.png", dpi=130)
     plots.contact_figure(result.scene, result.problem, result.solution).savefig(folder / "pressure.png", dpi=130)
     if result.path is not None:
-        from contactopt.animation import path_figure
+        from contactopt.figures.animation import path_figure
 
         path_figure(result.path).savefig(folder / "path.png", dpi=130)
 

@@ -11,13 +11,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import scenes
-from contactopt.accuracy import refine
+from contactopt.analysis.accuracy import refine
+from contactopt.analysis.quantities import QUANTITIES
+from contactopt.analysis.zone import solve_zone
 from contactopt.analytic import contact_modulus
-from contactopt.plots import BLUE, GREEN, GREY, ORANGE
-from contactopt.quantities import QUANTITIES
-from contactopt.refinement import split_scene
-from contactopt.scene import Material, Rigid, Scene
-from contactopt.zone import solve_zone
+from contactopt.bodies.refinement import split_scene
+from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
+from contactopt.material import Material
+from contactopt.scenes.scene import Rigid, Scene
 from experiments.corner_orders import CASES, GRADED, UNIFORM, orders
 from experiments.half_space import MATERIAL, flat, indenter
 from experiments.report import REPORTS, write

@@ -20,10 +20,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import scenes
-from contactopt.body import build_body
-from contactopt.factors import System
-from contactopt.linear import RTOL, make_solver
-from contactopt.multigrid import nodal_blocks, rigid_motions
+from contactopt.bodies.body import build_body
+from contactopt.bodies.solvers import make_solver
+from contactopt.bodies.solvers.multigrid import RTOL, nodal_blocks, rigid_motions
+from contactopt.bodies.solvers.system import System
 from experiments.report import write
 
 PLAIN = "pyamg's defaults"

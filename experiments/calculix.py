@@ -18,8 +18,8 @@ from typing import Any  # noqa: E402
 import numpy as np  # noqa: E402
 
 from contactopt import solve  # noqa: E402
-from contactopt.recover import recover  # noqa: E402
-from contactopt.reduction import reduce_bodies  # noqa: E402
+from contactopt.interface.recovery import recover  # noqa: E402
+from contactopt.interface.reduction import reduce_bodies  # noqa: E402
 from experiments.calculix_deck import LEAST  # noqa: E402
 from experiments.calculix_run import (  # noqa: E402
     MU,
@@ -100,8 +100,8 @@ def best_factor(sweep: list[dict[str, Any]], law: str) -> float:
 MEMORY = """
 import sys
 from contactopt import solve
-from contactopt.recover import recover
-from contactopt.reduction import reduce_bodies
+from contactopt.interface.recovery import recover
+from contactopt.interface.reduction import reduce_bodies
 from experiments.calculix_run import peak_memory, punch
 reduction = reduce_bodies(punch(int(sys.argv[1])))
 recover(reduction, solve(reduction.problem))

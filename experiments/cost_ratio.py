@@ -13,10 +13,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt import Scene, scenes, solve
-from contactopt.body import Body, build_body
-from contactopt.factors import System
-from contactopt.linear import make_solver
-from contactopt.reduction import reduce_bodies
+from contactopt.bodies.body import Body, build_body
+from contactopt.bodies.solvers import make_solver
+from contactopt.bodies.solvers.system import System
+from contactopt.interface.reduction import reduce_bodies
 from experiments.report import merged, write
 
 REPEATS = 3

@@ -14,11 +14,12 @@ from contextlib import contextmanager
 import numpy as np
 from matplotlib.figure import Figure
 
-from contactopt import Material, Part, Rigid, Scene, Support, elements, reduce_bodies, solve
+from contactopt import Material, Part, Rigid, Scene, Support, reduce_bodies, solve
+from contactopt.analysis.zone import contact_half_width
 from contactopt.analytic import contact_modulus, flat_punch_axisymmetric, hertz_point
-from contactopt.mesh import patch, rename, simplices, tensor_mesh
-from contactopt.plots import BLUE, GREY, ORANGE
-from contactopt.zone import contact_half_width
+from contactopt.bodies import elements
+from contactopt.figures.plots import BLUE, GREY, ORANGE
+from contactopt.scenes.meshes import patch, rename, simplices, tensor_mesh
 from experiments.report import write
 
 RUBBER, RADIUS = Material(5.0, 0.3), 50.0  # MPa; of the sphere, in contact half-widths

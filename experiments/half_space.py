@@ -17,8 +17,9 @@ from contactopt.analytic import (
     hertz_line,
     hertz_point,
 )
-from contactopt.mesh import patch, rename, tensor_mesh
-from contactopt.scene import Material, Part, Rigid, Scene, Support
+from contactopt.material import Material
+from contactopt.scenes.meshes import patch, rename, tensor_mesh
+from contactopt.scenes.scene import Part, Rigid, Scene, Support
 
 SLOPE, POWER, FAR = 2.8, 0.3, 100.0
 MATERIAL = Material(5.0, 0.3)

@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import reduce, scenes, solve
-from contactopt.plots import BLUE, GREY, ORANGE
-from contactopt.scene import Scene
-from contactopt.zone import contact_half_width, equivalent_half_width, pressed, solve_zone
+from contactopt.analysis.zone import contact_half_width, equivalent_half_width, pressed, solve_zone
+from contactopt.figures.plots import BLUE, GREY, ORANGE
+from contactopt.scenes.scene import Scene
 from experiments.report import write
 
 ELEMENTS = (8, 16, 32, 64, 128)

@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import scenes
-from contactopt.plots import BLUE, GREY, ORANGE
-from contactopt.zone import solve_zone
+from contactopt.analysis.zone import solve_zone
+from contactopt.figures.plots import BLUE, GREY, ORANGE
 from experiments.report import merged, write
 
 SIZES = (32, 48, 64, 92)  # elements across the half-width of the punch

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce, scenes, solve
-from contactopt.mesh import graded, rename, tensor_mesh
-from contactopt.operators import Interface
-from contactopt.plots import BLUE, GREEN, GREY, ORANGE
-from contactopt.preconditioners import (
+from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
+from contactopt.problem.operators import Interface
+from contactopt.scenes.meshes import graded, rename, tensor_mesh
+from contactopt.solving.preconditioners import (
     PRECONDITIONERS,
     Preconditioner,
     deflated,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 
-from contactopt import InterfaceProblem, reduce, scenes, solve, splitting
-from contactopt.backends import QP
+from contactopt import InterfaceProblem, reduce, scenes, solve
+from contactopt.solving.backends import QP
+from contactopt.solving.kernels import splitting
 from experiments.report import write
 
 REPEATS = 5
@@ -43,7 +44,7 @@ def without_crossover(name: str, problem):  # type: ignore[no-untyped-def]
 
 
 def as_it_comes(solvers, equations):  # type: ignore[no-untyped-def]
-    """The first answer of the first try, in place of contactopt.semismooth.certified."""
+    """The first answer of the first try, in place of contactopt.solving.kernels.semismooth.certified."""
     r, multipliers = next(iter(solvers))[1]()
     return r.reshape(equations.q.shape), multipliers
 
@@ -63,7 +64,7 @@ def in_all_units(name: str) -> dict[str, object]:
 
 
 TEXT = """The default `punch-2d` problem (17 contacts, mu = .5), normal and tangential problem both by the same backend at
-the tight settings of contactopt.backends, certified at 1e-9. Differences are relative to a solve at 1e-13.
+the tight settings of contactopt.solving.backends, certified at 1e-9. Differences are relative to a solve at 1e-13.
 "Without crossover" takes the backend's answers as they come, for at most 40 iterations.
 
 {rows}

@@ -7,9 +7,9 @@ import time
 from matplotlib.figure import Figure
 
 from contactopt import Material, reduce, scenes, solve
+from contactopt.analysis.zone import stick_half_width
 from contactopt.analytic import dundurs, stick_ratio
-from contactopt.plots import BLUE, GREEN, GREY, ORANGE
-from contactopt.zone import stick_half_width
+from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
 from experiments.report import write
 
 EXACT = stick_ratio(0.3, dundurs(None, Material(1.0, 0.3))[1])  # plane strain, mu = nu = .3

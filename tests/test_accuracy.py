@@ -7,12 +7,13 @@ from conftest import two_blocks
 from skfem import MeshQuad
 
 from contactopt import InputError, cli, run, scenes, solve
-from contactopt.accuracy import LARGEST, refine, remainder
-from contactopt.quantities import QUANTITIES, at_rim, peak_pressure
-from contactopt.reduction import reduce_bodies
-from contactopt.refinement import split
-from contactopt.scene import Material, Support
-from contactopt.zone import solve_zone
+from contactopt.analysis.accuracy import LARGEST, refine, remainder
+from contactopt.analysis.quantities import QUANTITIES, at_rim, peak_pressure
+from contactopt.analysis.zone import solve_zone
+from contactopt.bodies.refinement import split
+from contactopt.interface.reduction import reduce_bodies
+from contactopt.material import Material
+from contactopt.scenes.scene import Support
 from experiments.accuracy import effectivity, exact
 from experiments.half_space import flat, indenter
 

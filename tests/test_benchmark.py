@@ -295,7 +295,7 @@ def test_a_method_of_ones_own_takes_less_than_twenty_lines(tmp_path):
     mine = """
 import numpy as np
 from contactopt.benchmark import method
-from contactopt.cones import friction_cone
+from contactopt.problem.cones import friction_cone
 
 @method
 def fixed_point(problem, tol=1e-8, steps=20000):
@@ -325,7 +325,7 @@ from dataclasses import dataclass
 import numpy as np
 from contactopt import InterfaceProblem
 from contactopt.benchmark import method, problem
-from contactopt.methods.newton import Newton
+from contactopt.solving.methods.newton import Newton
 
 @method
 @dataclass(frozen=True)
@@ -364,7 +364,7 @@ def test_entry_points(tmp_path, monkeypatch):
     info = tmp_path / "theirs-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[contactopt.methods]\ntheirs = theirs:theirs\n")
+    (info / "entry_points.txt").write_text("[contactopt.solving.methods]\ntheirs = theirs:theirs\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     table = run(tmp_path, SMALL.replace('["auto", "nsgs"]', '"theirs"'))

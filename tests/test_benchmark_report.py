@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import contactopt.driver
+import contactopt.solving.driver
 from contactopt import InputError, benchmark
 from contactopt.benchmark import figures, tables
 from contactopt.benchmark.figures import _pareto, fitted_exponent
@@ -191,7 +191,7 @@ def test_a_report_is_rebuilt_without_solving(reported, monkeypatch):
     def forbidden(*arguments, **settings):
         raise AssertionError("a report must not solve")
 
-    monkeypatch.setattr(contactopt.driver, "solve", forbidden)
+    monkeypatch.setattr(contactopt.solving.driver, "solve", forbidden)
     assert main(["report", "--experiments", "campaigns"]) == 0
     again = Path("reports/small/report.md").read_text()
     assert again == text and "1. 12 runs were made." in text and "What it is." in text

@@ -5,7 +5,9 @@ from conftest import MATERIAL, block, two_blocks
 from skfem.helpers import ddot, sym_grad, trace
 
 from contactopt import BodyForce, InputError, Material, Part, Plate, Scene, Support, Traction
-from contactopt.body import build_body, lame, weight_at
+from contactopt.bodies.body import build_body
+from contactopt.bodies.elements import weight_at
+from contactopt.material import lame
 
 KINDS = ["plane-strain", "axisymmetric", "solid"]
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contactopt.cones import coulomb_cone, disc, disc_derivative, half_line_derivative
+from contactopt.problem.cones import coulomb_cone, disc, disc_derivative, half_line_derivative
 
 number = st.floats(-10, 10)
 

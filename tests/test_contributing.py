@@ -14,9 +14,9 @@ ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text()
 TABLES = {
     "A scene": ("contactopt.scenes", "SCENES"),
-    "A method": ("contactopt.methods", "METHODS"),
-    "A backend": ("contactopt.backends", "CONIC"),
-    "A preconditioner": ("contactopt.preconditioners", "PRECONDITIONERS"),
+    "A method": ("contactopt.solving.methods", "METHODS"),
+    "A backend": ("contactopt.solving.backends", "CONIC"),
+    "A preconditioner": ("contactopt.solving.preconditioners", "PRECONDITIONERS"),
 }
 
 

@@ -5,11 +5,11 @@ import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
-from contactopt.diagnosis import diagnose
-from contactopt.enumeration import all_solutions
-from contactopt.methods.alternating import Alternating
-from contactopt.methods.tresca import Tresca
+from contactopt.analysis.diagnosis import diagnose
+from contactopt.analysis.enumeration import all_solutions
 from contactopt.problem import Solution, Status
+from contactopt.solving.methods.alternating import Alternating
+from contactopt.solving.methods.tresca import Tresca
 
 BOTH = (("alternating", Alternating()), ("tresca", Tresca()))
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from contactopt import InterfaceProblem, Part, Rigid, Scene
-from contactopt.edges import contact_edge, stick_edge
-from contactopt.scene import Material
+from contactopt.analysis.edges import contact_edge, stick_edge
+from contactopt.material import Material
 
 PART = Part("body", None, Material(1.0, 0.3))
 

@@ -25,11 +25,12 @@ from contactopt import (
     scenes,
     solve,
 )
-from contactopt.body import build_body, lame
-from contactopt.elements import FACES, contact_trace, make_basis, weight_at
-from contactopt.mesh import rename, simplices, tensor_mesh
-from contactopt.recover import recover
+from contactopt.bodies.body import build_body
+from contactopt.bodies.elements import FACES, contact_trace, make_basis, weight_at
+from contactopt.interface.recovery import recover
+from contactopt.material import lame
 from contactopt.scenes.common import with_elements
+from contactopt.scenes.meshes import rename, simplices, tensor_mesh
 from experiments import elements as experiment
 
 KINDS = ["plane-strain", "axisymmetric", "solid"]

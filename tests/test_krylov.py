@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, reduce_bodies, run, scenes, solve
-from contactopt.alart_curnier import coulomb_equations
-from contactopt.factors import SuperLUSolver
-from contactopt.krylov import krylov_step, model_of
-from contactopt.operators import InterfaceOperator, block, estimate_diagonal, nodal_weights
+from contactopt.analysis.zone import solve_zone
+from contactopt.bodies.solvers.superlu import SuperLUSolver
+from contactopt.interface.reduction import form_of
 from contactopt.problem import dimensionless
-from contactopt.reduction import form_of
+from contactopt.problem.operators import InterfaceOperator, block, estimate_diagonal, nodal_weights
 from contactopt.scenes import make_scene
-from contactopt.subproblems import KrylovSubproblem
-from contactopt.zone import solve_zone
+from contactopt.solving.kernels.alart_curnier import coulomb_equations
+from contactopt.solving.kernels.krylov import krylov_step, model_of
+from contactopt.solving.kernels.subproblems import KrylovSubproblem
 
 SMALL = {"punch-2d": 16, "sphere": 12, "punch-3d": 4}
 

@@ -9,12 +9,12 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from contactopt import multigrid, reduce, scenes
-from contactopt.body import build_body
+from contactopt import reduce, scenes
+from contactopt.bodies.body import build_body
+from contactopt.bodies.solvers import LARGEST, SMALL, SOLVERS, choose, make_solver, multigrid
+from contactopt.bodies.solvers.multigrid import near_neighbours, rigid_motions
+from contactopt.bodies.solvers.system import System
 from contactopt.errors import BackendError, InputError
-from contactopt.factors import System
-from contactopt.linear import LARGEST, SMALL, SOLVERS, choose, make_solver
-from contactopt.multigrid import near_neighbours, rigid_motions
 
 
 def system(scene, part, elements):

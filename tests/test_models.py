@@ -5,8 +5,8 @@ import qpsolvers
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, models
-from contactopt.backends import CONIC, QP
-from contactopt.backends.conic import Conic
+from contactopt.solving.backends import CONIC, QP
+from contactopt.solving.backends.conic import Conic
 
 PROGRAMS = ("normal", "displacements", "penalised", "bilateral", "tangential", "tresca", "associated", "acary_cadoux")
 

@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve, transfer
-from contactopt.alart_curnier import coulomb_equations
 from contactopt.benchmark.problems import rigid_bodies as random_rigid_bodies
 from contactopt.benchmark.problems import tangential
-from contactopt.bonded import Bonded
-from contactopt.cones import coulomb_map
-from contactopt.methods.auto import Auto
 from contactopt.problem import dimensionless
+from contactopt.problem.cones import coulomb_map
 from contactopt.scenes import make_scene
-from contactopt.semismooth import Equations
+from contactopt.solving.kernels.alart_curnier import coulomb_equations
+from contactopt.solving.kernels.bonded import Bonded
+from contactopt.solving.kernels.semismooth import Equations
+from contactopt.solving.methods.auto import Auto
 from experiments.robustness import rigid_bodies
 
 SMALL = {"punch-2d": 16, "punch-3d": 5, "sphere": 12}
@@ -207,7 +207,8 @@ def test_auto_leaves_newton_when_it_cycles(monkeypatch):
     problem, _ = dimensionless(rigid_bodies(1, 6, 14, 0.7))
     wrong = np.ones(problem.q.shape)
     monkeypatch.setattr(
-        "contactopt.methods.newton.Newton.steps", lambda self, p, s=None: iter([((wrong, np.zeros(0)), 1.0)] * 50)
+        "contactopt.solving.methods.newton.Newton.steps",
+        lambda self, p, s=None: iter([((wrong, np.zeros(0)), 1.0)] * 50),
     )
     points = []
     for point in Auto().iterate(problem):

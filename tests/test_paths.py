@@ -19,7 +19,7 @@ from contactopt import (
     scenes,
     solve,
 )  # fmt: skip
-from contactopt.paths import follow
+from contactopt.analysis.paths import follow
 
 
 def dragged(shift: float, force: float = 3.0, mu: float = 0.4) -> Scene:
@@ -218,7 +218,7 @@ def test_run_follows_the_path_of_a_named_scene(tmp_path):
 def test_animation(tmp_path):
     from PIL import Image
 
-    from contactopt.animation import animate, loop
+    from contactopt.figures.animation import animate, loop
 
     cycle = follow(sheared(elements=8)[:4])
     animate(cycle, tmp_path / "film.gif")

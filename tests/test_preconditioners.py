@@ -4,19 +4,16 @@ import scipy.linalg as la
 from scipy.sparse.linalg import cg
 
 from contactopt import InputError, InterfaceProblem, reduce, scenes
-from contactopt.cosine import Grid
-from contactopt.preconditioners import (
+from contactopt.solving.preconditioners import (
     PRECONDITIONERS,
     deflated,
-    norm,
-    p21,
-    p22,
     preconditioner,
     restricted,
     selection,
-    seminorm,
     smooth_motions,
 )
+from contactopt.solving.preconditioners.circulant import norm, p21, p22, seminorm
+from contactopt.solving.preconditioners.grid import Grid
 from experiments.preconditioners import blocks, condition, solids
 
 # Condition numbers of the normal block on these bodies, measured on an independent prototype: k -> Q, P21 Q, P22 Q.

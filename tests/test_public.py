@@ -9,10 +9,12 @@ from typing import Any
 import pytest
 
 import contactopt
-from contactopt.methods import METHODS
+from contactopt.solving.methods import METHODS
 
 # homes of what `contactopt` exports, the modules it exports, and those that its documentation sends readers to
-MODULES = sorted({*contactopt._HOMES, *contactopt._MODULES, "analytic", "cones", "mesh", "preconditioners"})
+MODULES = sorted(
+    {*contactopt._HOMES, *contactopt._MODULES.values(), "problem.cones", "scenes.meshes", "solving.preconditioners"}
+)
 
 
 def defined_in(module: Any) -> Iterator[tuple[str, Any]]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from contactopt.methods import METHODS
+from contactopt.solving.methods import METHODS
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()

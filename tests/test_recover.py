@@ -4,7 +4,7 @@ import pytest
 from conftest import two_blocks
 
 from contactopt import reduce_bodies, scenes, solve
-from contactopt.recover import recover
+from contactopt.interface.recovery import recover
 
 
 def solved(scene, **kw):

@@ -18,8 +18,8 @@ from contactopt import (
     scenes,
     solve,
 )
-from contactopt.dissection import nested_dissection
-from contactopt.recover import recover
+from contactopt.bodies.solvers.ordering import nested_dissection
+from contactopt.interface.recovery import recover
 
 KINDS = ["plane-strain", "axisymmetric", "solid"]
 AREA = {"plane-strain": 1.0, "axisymmetric": np.pi, "solid": 1.0}

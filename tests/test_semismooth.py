@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from contactopt.cones import disc_derivative, half_line_derivative
-from contactopt.semismooth import crossover
+from contactopt.problem.cones import disc_derivative, half_line_derivative
+from contactopt.solving.kernels.semismooth import crossover
 
 
 def spd(n, seed=0):

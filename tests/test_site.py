@@ -11,7 +11,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 import contactopt
-from contactopt.methods import METHODS
+from contactopt.solving.methods import METHODS
 
 ROOT = Path(__file__).parents[1]
 SITE = ROOT / "experiments" / "site"

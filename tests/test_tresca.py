@@ -6,9 +6,9 @@ import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, Material, Part, Rigid, Scene, Support, fclib, reduce, scenes, solve
-from contactopt.mesh import rename, tensor_mesh
-from contactopt.methods.tresca import Tresca, TrescaProblem
 from contactopt.problem import dimensionless
+from contactopt.scenes.meshes import rename, tensor_mesh
+from contactopt.solving.methods.tresca import Tresca, TrescaProblem
 
 CYCLING = (-10.0, 1.0)
 FCLIB = Path(__file__).parents[2] / "shared" / "fclib"

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from contactopt import reduce, scenes, solve
-from contactopt.zone import contact_half_width, pressed, solve_zone, stick_half_width, stuck
+from contactopt.analysis.zone import contact_half_width, pressed, solve_zone, stick_half_width, stuck
 
 
 @pytest.fixture(scope="module")

@@ -19,8 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from contactopt.checks import check_number
 from contactopt.errors import InputError
-from contactopt.scene import Material, check_number
+from contactopt.material import Material
 
 DEGREE = 24  # of the Chebyshev interpolant of the determinant, an entire function of lambda
 INTERVAL = 0.05, 0.95  # of interpolation, away from the zeros of rigid motions at 0 and 1

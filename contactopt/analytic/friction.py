@@ -15,9 +15,9 @@ from contactopt.analytic.normal import (
     under_punch,
 )
 from contactopt.analytic.panels import ODD
-from contactopt.analytic.reference import Field, Reference, check_beta, check_positive
+from contactopt.analytic.reference import Field, Reference, check_beta
 from contactopt.analytic.spence import UnitPunch, unit_punch
-from contactopt.scene import check_number
+from contactopt.checks import check_number, check_positive
 
 
 def flat_punch_line_friction(force_per_length: float, half_width: float, mu: float, beta: float) -> Reference:

@@ -18,9 +18,9 @@ from itertools import pairwise
 import numpy as np
 
 from contactopt.analytic.normal import hertz_line, hertz_point
-from contactopt.analytic.reference import Reference, check_positive, ellipse
+from contactopt.analytic.reference import Reference, ellipse
+from contactopt.checks import check_number, check_positive
 from contactopt.errors import InputError
-from contactopt.scene import check_number
 
 
 def hertz_line_tangential(

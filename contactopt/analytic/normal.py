@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactopt.analytic.reference import Field, Reference, check_beta, check_positive, ellipse
+from contactopt.analytic.reference import Field, Reference, check_beta, ellipse
+from contactopt.checks import check_positive
 
 
 def hertz_point(force: float, radius: float, modulus: float) -> Reference:

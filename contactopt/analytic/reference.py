@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactopt.checks import check_number
 from contactopt.errors import InputError
-from contactopt.scene import Material, check_number
+from contactopt.material import Material
 
 Field = Callable[[np.ndarray], np.ndarray]
 
@@ -74,12 +75,6 @@ def dundurs(upper: Material | None, lower: Material | None) -> tuple[float, floa
 def ellipse(x: np.ndarray, a: float, peak: float) -> np.ndarray:
     """peak sqrt(1 - x^2 / a^2), zero outside."""
     return np.asarray(peak * np.sqrt(np.maximum(0.0, 1 - np.square(np.asarray(x) / a))))
-
-
-def check_positive(**values: float) -> None:
-    """Raise InputError unless every value is a positive finite number."""
-    for name, value in values.items():
-        check_number(name.replace("_", " "), value, low=0.0)
 
 
 def check_beta(beta: float) -> None:

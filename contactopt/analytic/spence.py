@@ -21,7 +21,7 @@ import numpy as np
 
 from contactopt.analytic.panels import EVEN, LEFT, ODD, ORDER, TRANSFORM, Panels
 from contactopt.analytic.reference import check_beta
-from contactopt.scene import check_number
+from contactopt.checks import check_number
 
 SMALLEST, LARGEST = 1e-9, 19.5  # artanh(c/a): below, c/a is called zero; above, it is one in double precision
 

@@ -17,8 +17,8 @@ import numpy as np
 from contactopt.benchmark.plugins import load_plugins
 from contactopt.benchmark.problems import KINDS, ProblemSpec, named
 from contactopt.benchmark.runs import SETTINGS, STARTS, MethodSpec, Run
+from contactopt.checks import check_number
 from contactopt.errors import InputError
-from contactopt.scene import check_number
 
 
 class NothingToRun(InputError):

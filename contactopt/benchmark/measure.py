@@ -18,19 +18,19 @@ import numpy as np
 
 from contactopt.benchmark.runs import PASSED, Run
 from contactopt.benchmark.store import SCHEMA, pack
-from contactopt.cones import coulomb_cone
-from contactopt.driver import solve
 from contactopt.errors import BackendError, InputError
-from contactopt.methods import find_method
 from contactopt.problem import (
     InterfaceProblem,
     Solution,
     Status,
     balance_residual,
-    balanced_step,
     fit_multipliers,
     natural_map_residual,
 )
+from contactopt.problem.certificate import balanced_step
+from contactopt.problem.cones import coulomb_cone
+from contactopt.solving.driver import solve
+from contactopt.solving.methods import find_method
 
 POINTS = 100  # of a history
 MB = 1e6

@@ -15,8 +15,8 @@ import scipy.linalg as la
 from contactopt.benchmark.plugins import plugin_problems
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
-from contactopt.scene import Part, Scene
 from contactopt.scenes import SCENES, make_scene
+from contactopt.scenes.scene import Part, Scene
 
 KINDS = ("scene", "fclib", "family")
 MATERIALS = ("upper_E", "upper_nu", "lower_E", "lower_nu", "stiffness_ratio")
@@ -92,7 +92,7 @@ def scene(name: str, **parameters: Any) -> Scene:
 
 def reduced(name: str, **parameters: Any) -> InterfaceProblem:
     """With explicit Q."""
-    from contactopt.reduction import reduce
+    from contactopt.interface.reduction import reduce
 
     return reduce(scene(name, **parameters), Q="explicit")
 
@@ -156,7 +156,7 @@ def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) 
     no force is that of the scene under p, and a drag along the first axis that would need the force shear * mu * p if
     nothing slipped.
     """
-    from contactopt.driver import solve
+    from contactopt.solving.driver import solve
 
     coupled = reduced(of, mu=0.0, **parameters)
     k, dim = coupled.q.shape

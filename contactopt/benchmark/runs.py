@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
-from contactopt.backends import CONIC, QP
 from contactopt.benchmark.plugins import Plugin, find_plugin
 from contactopt.benchmark.problems import ProblemSpec, short_number
 from contactopt.errors import InputError
-from contactopt.methods import METHODS, NATIVE, find_method
+from contactopt.solving.backends import CONIC, QP
+from contactopt.solving.methods import METHODS, NATIVE, find_method
 
 DEFAULT_TOL = 1e-8  # by which the setting "default" is judged: that of contactopt.solve
 SETTINGS = {"default": DEFAULT_TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}

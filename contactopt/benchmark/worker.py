@@ -22,9 +22,9 @@ import numpy as np
 from contactopt.benchmark.measure import Task, blank, call, measure, short
 from contactopt.benchmark.plugins import load_plugins
 from contactopt.benchmark.problems import ProblemSpec
-from contactopt.driver import solve
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution
+from contactopt.solving.driver import solve
 
 KEPT = 3  # problems in memory
 NEIGHBOUR = 0.9  # load and friction of the problem whose solution is the warm start
@@ -117,7 +117,7 @@ def sizes(problem: InterfaceProblem) -> dict[str, Any]:
 
 
 def diagnosis(problem: InterfaceProblem) -> dict[str, float]:
-    from contactopt.diagnosis import diagnose
+    from contactopt.analysis.diagnosis import diagnose
 
     found = diagnose(problem)
     return {

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from contactopt.errors import InputError
-from contactopt.scene import Scene
 from contactopt.scenes.common import with_elements
 from contactopt.scenes.flat import flat_punch, rigid_punch
 from contactopt.scenes.round import cylinder, growing_indentation, indentation, sphere
+from contactopt.scenes.scene import Scene
 from contactopt.scenes.sliding import cattaneo, shear_cycle
 
 __all__ = [

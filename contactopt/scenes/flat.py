@@ -12,9 +12,11 @@ from contactopt.analytic import (
     flat_punch_line,
     flat_punch_line_friction,
 )
+from contactopt.checks import check_number, check_positive
 from contactopt.errors import InputError
-from contactopt.scene import Material, Part, Plate, Rigid, Scene, Support, check_number
-from contactopt.scenes.common import GROWTH, RUBBER, UNITS, check_positive
+from contactopt.material import Material
+from contactopt.scenes.common import GROWTH, RUBBER, UNITS
+from contactopt.scenes.scene import Part, Plate, Rigid, Scene, Support
 
 EDGE = 1e-3  # first element at the edge of the rigid punch, over its half-width
 RATIO = 1.4  # of its neighbouring elements: a mesh for quadratic displacements
@@ -58,7 +60,7 @@ def flat_punch(
     a, up, growth = width / 2, "xyz"[dim - 1], GROWTH[dim]
 
     def punch_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.mesh import contact_grid, graded, rename, tensor_mesh
+        from contactopt.scenes.meshes import contact_grid, graded, rename, tensor_mesh
 
         rise = graded(height, a / elements, growth)
         across = contact_grid(a, elements, a, growth)
@@ -66,7 +68,7 @@ def flat_punch(
         return rename(mesh, contact=f"{up}-", top=f"{up}+", **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
 
     def foundation_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.mesh import contact_grid, graded, patch, rename, tensor_mesh
+        from contactopt.scenes.meshes import contact_grid, graded, patch, rename, tensor_mesh
 
         depth_grid = -graded(foundation_height, a / elements, growth)[::-1]
         across = contact_grid(a, elements, foundation_width / 2, growth)
@@ -128,7 +130,7 @@ def rigid_punch(
     across, up = ("x", "y") if kind == "plane-strain" else ("r", "z")
 
     def mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.mesh import graded, patch, rename, tensor_mesh
+        from contactopt.scenes.meshes import graded, patch, rename, tensor_mesh
 
         first = EDGE * half_width
         contact = _towards_edge(half_width, elements, first)

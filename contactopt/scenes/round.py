@@ -8,9 +8,11 @@ from math import sqrt
 import numpy as np
 
 from contactopt.analytic import Reference, contact_modulus, dundurs, hertz_line, hertz_point, hertz_point_friction
+from contactopt.checks import check_count, check_positive
 from contactopt.errors import InputError
-from contactopt.scene import Material, Part, Plate, Rigid, Scene, Support
-from contactopt.scenes.common import GROWTH, MARGIN, RUBBER, UNITS, check_count, check_positive
+from contactopt.material import Material
+from contactopt.scenes.common import GROWTH, MARGIN, RUBBER, UNITS
+from contactopt.scenes.scene import Part, Plate, Rigid, Scene, Support
 
 LARGE = 400.0  # half-space: size of the foundation over the contact radius
 
@@ -176,7 +178,7 @@ def _round_bodies(
         return _candidates(elements, min(zone or hertz.half_width, widest))
 
     def upper_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.mesh import graded, half_sphere_section, patch
+        from contactopt.scenes.meshes import graded, half_sphere_section, patch
 
         contact = candidates(elements, zone)
         grid = _beyond(contact, radius / sqrt(2))
@@ -208,14 +210,14 @@ def _candidates(elements: int, zone: float) -> np.ndarray:
 
 
 def _beyond(grid: np.ndarray, length: float) -> np.ndarray:
-    from contactopt.mesh import graded
+    from contactopt.scenes.meshes import graded
 
     return np.concatenate([grid, grid[-1] + graded(length - grid[-1], grid[1] * GROWTH[2], GROWTH[2])[1:]])
 
 
 def _foundation_mesh(contact: np.ndarray, width: float, height: float):  # type: ignore[no-untyped-def]
     """Half of a foundation, the contact nodes at the given positions on its top."""
-    from contactopt.mesh import graded, patch, rename, tensor_mesh
+    from contactopt.scenes.meshes import graded, patch, rename, tensor_mesh
 
     mesh = tensor_mesh(_beyond(contact, width), -graded(height, contact[1], GROWTH[2])[::-1])
     return patch(rename(mesh, axis="x-", bottom="y-", top="y+"), "top", "contact", [contact[-1]])

@@ -15,9 +15,11 @@ from contactopt.analytic import (
     hertz_point_tangential,
     tangential_modulus,
 )
+from contactopt.checks import check_count, check_number, check_positive
 from contactopt.errors import InputError
-from contactopt.scene import Material, Part, Plate, Scene, Support, check_number
-from contactopt.scenes.common import MARGIN, RUBBER, UNITS, check_count, check_positive
+from contactopt.material import Material
+from contactopt.scenes.common import MARGIN, RUBBER, UNITS
+from contactopt.scenes.scene import Part, Plate, Scene, Support
 
 RADIUS = {2: 4000.0, 3: 10000.0}  # so that contact is small: a / R = .005 and .007
 ELEMENTS = {2: 32, 3: 20}
@@ -73,8 +75,8 @@ def cattaneo(
     stick, up = reference.stick_half_width or a, "xyz"[dim - 1]
 
     def mesh(elements: int, sign: float):  # type: ignore[no-untyped-def]
-        from contactopt.disc import extrude, half_disc
-        from contactopt.mesh import graded, tensor_mesh
+        from contactopt.scenes.discs import extrude, half_disc
+        from contactopt.scenes.meshes import graded, tensor_mesh
 
         contact = _towards_edges(stick, a, elements, growth)
         reach, h = contact[-1], a / elements

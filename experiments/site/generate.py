@@ -15,7 +15,7 @@ from pathlib import Path
 
 import contactopt
 import contactopt.cli
-from contactopt.methods import METHODS
+from contactopt.solving.methods import METHODS
 
 ROOT = Path(__file__).parents[2]
 # the order in which a course would take them

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import Material, Part, Scene, Support, reduce, reduce_bodies
-from contactopt.mesh import graded, rename, tensor_mesh
+from contactopt.scenes.meshes import graded, rename, tensor_mesh
 
 # %% [markdown]
 # ## Two springs

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt import Material, Part, Scene, Support, reduce
-from contactopt.mesh import graded, rename, tensor_mesh
-from contactopt.preconditioners import preconditioner
+from contactopt.scenes.meshes import graded, rename, tensor_mesh
+from contactopt.solving.preconditioners import preconditioner
 
 # %% [markdown]
 # ## The problem of size
@@ -179,7 +179,7 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(motion[:
 # One eigenvalue stands apart, on the right, for all three. It is the *sway* of the punch: a motion of the whole body,
 # which no symbol of the surface can know. CG needs one or two more iterations to deal with it, not many. That is why
 # the condition number is a pessimist here, and why it pays to solve for such a motion exactly
-# (`contactopt.preconditioners.deflated`).
+# (`contactopt.solving.preconditioners.deflated`).
 #
 # ## Exercises
 #
@@ -225,7 +225,7 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(motion[:
 # <details><summary>Solution</summary>
 #
 # ```python
-# from contactopt.preconditioners import deflated, smooth_motions
+# from contactopt.solving.preconditioners import deflated, smooth_motions
 # P = preconditioner(problem, "p21")
 # exact_on_smooth = deflated(P, problem.Q, smooth_motions(problem))
 # assert iterations(problem.Q, exact_on_smooth) < counts["p21"][nodes]

@@ -1,0 +1,311 @@
+"""Meshes no finer than needed: refined until the estimated error of one quantity J is below a target.
+
+Two numbers describe a mesh: `elements` across the contact half-width, which the scene's mesh functions receive, and
+`splits`: how often the mesh made for elements / 2^splits was then halved everywhere. Elements in the contact zone have the
+same size whatever the splits; away from it every split turns a growth g of the elements into sqrt(g), and it halves
+whatever size the mesh function holds fixed. The error is taken as one part that falls with each,
+
+    J(elements, splits) - J = A elements^-p + B 2^(-p' splits),
+
+both read from differences of nested solutions (Richardson): the first of the meshes for n, 2 n, 4 n elements, the
+second of the last of them and its split, measured anew on the mesh that it asks to split. Their sizes are added, the
+larger part is refined next. A value read between nodes is as uncertain as its readings from two sides differ, whatever
+the sum says. Orders are observed where there are three solutions, and held between 3/4 and 2 per degree of the
+displacement, the order of functionals of smooth solutions, or 2 where an edge is read, since the solution is not smooth
+there. Not estimated, because no refinement shows it: what finite bodies differ from half-spaces, and the steps of a
+load path.
+
+Source: Roache (1998), Verification and Validation in Computational Science and Engineering, chapter 5.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from contactopt.analysis.paths import PathResult, follow
+from contactopt.analysis.quantities import QUANTITIES, at_rim, uncertainty
+from contactopt.analysis.zone import AGREE, LOOPS, contact_half_width, pressed
+from contactopt.bodies.refinement import split_scene
+from contactopt.checks import check_number
+from contactopt.errors import InputError
+from contactopt.interface.reduction import Reduction, reduce_bodies
+from contactopt.problem import Solution
+from contactopt.problem.transfer import transfer
+from contactopt.scenes.scene import Scene
+from contactopt.solving.driver import solve
+
+COARSEST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least
+BELOW = 8  # and by how much fewer than the scene's default
+LARGEST = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about a gigabyte and half a minute
+SLOWEST = 0.75  # least order that is believed: slower ones were noise wherever the exact value was known
+EDGES = ("width", "stick")
+STUCK = 0.1  # order below which a sequence does not converge
+
+
+@dataclass(frozen=True)
+class Level:
+    """One solve. `zone`: half-width that the mesh resolves [length], None without a zone loop; `uncertainty` of the value."""
+
+    elements: int
+    splits: int
+    unknowns: int
+    contacts: int
+    rounds: int
+    zone: float | None
+    value: float
+    uncertainty: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What is known of a quantity after the last solve.
+
+    value         on the last mesh;  extrapolated: less the estimated error
+    error         estimated, relative to the value: mesh_error and grading_error, signed; at least the uncertainty; None: unknown
+    order         observed of the first part, None if the sequence is not monotone
+    reached       whether error <= target;  message: one sentence;  levels: in the order they were solved
+    """
+
+    quantity: str
+    target: float
+    value: float
+    extrapolated: float | None
+    error: float | None
+    mesh_error: float | None
+    grading_error: float | None
+    order: float | None
+    reached: bool
+    message: str
+    levels: tuple[Level, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A solved mesh: `path` if the scene has one, `zones` of the zone loop."""
+
+    level: Level
+    reduction: Reduction
+    solution: Solution
+    zones: tuple[float, ...] = ()
+    path: PathResult | None = None
+
+    @property
+    def failure(self) -> str:
+        """One sentence, or nothing if it was solved."""
+        if self.solution.solved:
+            return ""
+        return f"the mesh of {self.level.unknowns} unknowns was not solved: {self.solution.message}"
+
+
+def refine(
+    states: Sequence[Scene],
+    quantity: str,
+    accuracy: float,
+    note: Callable[[str], None] = lambda text: None,
+    Q: str = "auto",
+    solver: str = "auto",
+    **settings: Any,
+) -> tuple[Solved, Estimate]:
+    """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
+
+    quantity  a name in QUANTITIES;  accuracy  bound on its estimated relative error, between 0 and 1
+    Q, solver, settings  as for solve_zone()
+    Ends short of the target, with a sentence in the estimate, where the quantity does not converge, the next mesh would have
+    more than LARGEST unknowns, or a solve fails. Raises InputError for an unknown quantity or an accuracy out of range.
+    """
+    if quantity not in QUANTITIES:
+        raise InputError(f"unknown quantity {quantity!r}; choose from {', '.join(QUANTITIES)}.")
+    check_number("the accuracy", accuracy, low=0.0, high=1.0)
+    search = _Search(tuple(states), quantity, note, {"Q": Q, "solver": solver}, settings)
+    while True:
+        mesh, order, grading = *search.mesh_error(), search.grading_error()
+        read, scale = search.meshes[-1].uncertainty, abs(search.meshes[-1].value) or 1.0
+        error = max(abs(mesh) + abs(grading), read) / scale
+        message = in_vain = search.obstacle()
+        if in_vain or error <= accuracy:
+            break
+        note(f"{quantity} {search.meshes[-1].value:.6g}, estimated error {error:.1e}")
+        message = search.finer_grading() if abs(grading) > max(abs(mesh), read) else search.finer_mesh()
+        if message:
+            break
+    last = search.final()
+    message = message or last.failure
+    coarse = sum(level.seconds for level in search.levels) - last.level.seconds
+    last = replace(last, solution=replace(last.solution, seconds=last.solution.seconds | {"coarse": coarse}))
+    value = last.level.value
+    parts: dict[str, Any] = dict.fromkeys(("extrapolated", "error", "mesh_error", "grading_error", "order"))
+    if not in_vain and np.isfinite(error):
+        parts = dict(zip(parts, (value - mesh - grading, error, mesh / scale, grading / scale, order)))
+    sentence = message or f"the estimated error of the {quantity} is below the target"
+    levels = tuple(search.levels)
+    return last, Estimate(quantity, accuracy, value, reached=not message, message=sentence, levels=levels, **parts)
+
+
+def remainder(before: float | None, last: float, best: float) -> tuple[float, float | None]:
+    """Sum of all further differences of a sequence under halving, and its order, None if unknown.
+
+    before, last  its last two differences: the order is log2(before / last), held within SLOWEST and `best`. Never
+    less than what `best` leaves of the difference before, since a small last one may be luck; where the two have
+    opposite signs the remainder is as large as the last difference, or a quarter of the one before.
+    """
+    order = None
+    size = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1)
+    if before and last and before / last < 0:
+        size = max(abs(last), abs(before) / 4)
+    elif before and last:
+        order = float(np.log2(before / last))
+        size = max(size, abs(last) / (2 ** np.clip(order, SLOWEST, best) - 1))
+    return float(np.copysign(size, last)), order
+
+
+class _Search:
+    """The nested solves and what they say. The last of `meshes`, with `splits`, is the mesh in question.
+
+    meshes   levels of the main sequence: doubled elements without splits, or, where the meshes are given, splits alone
+    changes  of the value by the first split, the second, ...: those of the present splits, and at least one
+    share    by which the first split multiplies the unknowns
+    """
+
+    def __init__(self, states, quantity, note, forms, settings):  # type: ignore[no-untyped-def]
+        self.states, self.quantity, self.note, self.forms, self.settings = states, quantity, note, forms, settings
+        scene = states[-1]
+        self.given = scene.given
+        self.first = scene.elements if self.given else max(COARSEST[scene.dim], scene.elements // BELOW)
+        self.best = 2 if quantity in EDGES else 2 * scene.degree
+        self.levels: list[Level] = []
+        self.meshes: list[Level] = []
+        self.changes: list[float] = []
+        self.splits, self.share = 0, 1.0
+        self.last: Solved | None = None
+        self.split_last: Solved | None = None
+        self._refine_mesh()
+        while len(self.meshes) < 3 and not self.obstacle() and not self.finer_mesh():
+            pass
+        if scene.dim == 2 and not self.given and len(self.meshes) > 1:
+            self._split(1, self.meshes[-1].elements)
+
+    def mesh_error(self) -> tuple[float, float | None]:
+        """Of the value on the last mesh, signed [unit of the quantity], and its order; infinite for a single mesh."""
+        steps = np.diff([level.value for level in self.meshes[-3:]])
+        if not len(steps):
+            return np.inf, None
+        rest, order = remainder(steps[-2] if len(steps) > 1 else None, steps[-1], self.best)
+        return -rest, order
+
+    def grading_error(self) -> float:
+        """Of the meshes with the present splits, signed."""
+        if not self.changes:
+            return 0.0
+        before = self.changes[-2] if len(self.changes) > 1 else None
+        rest = remainder(before, self.changes[-1], self.best)[0]
+        return -rest - sum(self.changes[self.splits :])
+
+    def obstacle(self) -> str:
+        """Why it would be in vain to go on, or nothing."""
+        assert self.last is not None
+        if self.last.failure:
+            return self.last.failure
+        if self.quantity == "pressure" and at_rim(self.last.reduction, self.last.solution):
+            return "the largest pressure is at the edge of the contact surface, a corner, where no mesh bounds it"
+        steps = np.diff([level.value for level in self.meshes])
+        if len(steps) > 2 and np.all(steps[-2:] * np.sign(steps[-1]) > 2**-STUCK * np.abs(steps[-3:-1])):
+            return f"the {self.quantity} does not converge: every refinement changes it by as much as the one before"
+        return ""
+
+    def finer_mesh(self) -> str:
+        """Refine the last mesh; or the reason not to."""
+        counts = [level.unknowns for level in self.meshes[-2:]]
+        growth = counts[1] / counts[0] if len(counts) > 1 else 2.0 ** self.states[-1].dim
+        if reason := self._too_large(growth, self.splits):
+            return reason
+        self._refine_mesh()
+        return ""
+
+    def finer_grading(self) -> str:
+        """One split more; or the reason not to."""
+        elements = self.meshes[-1].elements
+        if 2 ** (self.splits + 1) * self.first > elements:  # would start from a mesh coarser than the first
+            return self.finer_mesh()
+        if reason := self._too_large(1.0, self.splits + 1):
+            return reason
+        self.splits += 1
+        self._split(self.splits, elements)
+        return ""
+
+    def final(self) -> Solved:
+        """The last mesh with the present splits."""
+        assert self.last is not None
+        wanted = self.last.level.elements, self.last.level.splits if self.given else self.splits
+        for solved in (self.last, self.split_last):
+            if solved is not None and (solved.level.elements, solved.level.splits) == wanted:
+                return solved
+        return self._solve(*wanted)
+
+    def _too_large(self, growth: float, splits: int) -> str:
+        """A sentence if the next mesh passes the limit."""
+        dim = self.states[-1].dim
+        unknowns = growth * self.meshes[-1].unknowns * self.share**splits
+        if unknowns <= LARGEST[dim]:
+            return ""
+        return f"to go on would take up to {unknowns:.2g} unknowns, more than {LARGEST[dim]:,}"
+
+    def _refine_mesh(self) -> None:
+        i = len(self.meshes)
+        self.last = self._solve(self.first if self.given else self.first * 2**i, i if self.given else 0)
+        self.meshes.append(self.last.level)
+
+    def _split(self, splits: int, elements: int) -> None:
+        """Measure the change by a split."""
+        known = {(level.elements, level.splits): level.value for level in self.levels}
+        if (elements, splits - 1) not in known:
+            known[elements, splits - 1] = self._solve(elements, splits - 1).level.value
+        self.split_last = self._solve(elements, splits)
+        if not self.changes:
+            self.share = self.split_last.level.unknowns / self.meshes[-1].unknowns
+        self.changes[splits - 1 :] = [self.split_last.level.value - known[elements, splits - 1]]
+
+    def _solve(self, elements: int, splits: int) -> Solved:
+        self.note(f"{elements} elements across the half-width" + (f", {splits} splits" if splits else ""))
+        begin = time.perf_counter()
+        base = elements if self.given else elements // 2**splits
+        states = [split_scene(scene, base, splits) for scene in self.states]
+        if len(states) > 1:
+            path = follow(states, elements, **self.forms, **self.settings)
+            reduction, solution, zones = path.reduction, path.solution, list[float]()
+        else:
+            path = None
+            reduction, solution, zones = self._zone_loop(states[0], elements)
+        value = QUANTITIES[self.quantity](reduction, solution), uncertainty(self.quantity, reduction, solution)
+        size = reduction.dofs, reduction.problem.contacts, max(1, len(zones) - 1), zones[-2] if zones else None
+        self.levels.append(Level(elements, splits, *size, *value, time.perf_counter() - begin))
+        return Solved(self.levels[-1], reduction, solution, tuple(zones), path)
+
+    def _zone_loop(self, scene: Scene, elements: int) -> tuple[Reduction, Solution, list[float]]:
+        """As solve_zone(), from the last mesh's zone and solution."""
+        before, seconds = self.last, Counter[str]()
+        known = before.zones[-1:] if before is not None else ()
+        zones = list(known) or ([] if scene.zone is None else [scene.zone])
+        source = None if before is None else (before.reduction.problem, before.solution)
+        while True:
+            reduction = reduce_bodies(scene, elements, zones[-1] if zones else None, **self.forms)
+            start = None if source is None else transfer(*source, reduction.problem)
+            solution = solve(reduction.problem, start=start, **self.settings)
+            source = reduction.problem, solution
+            seconds.update(reduction.seconds)
+            seconds.update(solution.seconds)
+            solution = replace(solution, seconds=dict(seconds))
+            if not zones:
+                return reduction, solution, zones
+            if pressed(solution.reactions).sum() < 2:
+                raise InputError(f"scene '{scene.name}': fewer than two nodes are in contact; take more elements.")
+            zones.append(contact_half_width(scene, reduction.problem, solution.reactions))
+            agreed = abs(zones[-1] - zones[-2]) <= AGREE * zones[-2] / elements
+            if agreed or not solution.solved or len(zones) > LOOPS:
+                return reduction, solution, zones

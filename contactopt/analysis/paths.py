@@ -1,0 +1,260 @@
+"""Load paths: a sequence of load states, slip measured from the last converged state (the paper's 'quasistatic').
+
+Coulomb's law in its rate form, friction against the slip velocity, is integrated by implicit Euler steps: step n is
+the static problem of contactopt.problem with u_t replaced by the slip of the step, u_t - u_t(n-1), that is with q_t
+shifted by -u_t(n-1). Normal displacements (gaps) and plate displacements stay total; Q and V do not change.
+
+Energy of a step, exact for the discrete bodies because they are linear. With F the nodal forces on a body (of loads,
+supports and plates), r the contact forces, E the elastic energy and a bar for the mean of the states n-1 and n,
+
+    W = sum F-bar' dU  =  dE + D,   D = -r-bar' du                                                    (midpoint work)
+
+whatever law gave r. Of D, friction dissipates what Coulomb's law says, D_f = -r_t(n)' du_t = sum mu r_n |du_t| >= 0;
+the rest, D - D_f = r_n(n)' u_n(n-1) + (r(n) - r(n-1))' du / 2, is the error of the step in energy: second order in its
+size, zero where neither contact nor the direction and bound of slip change.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.analysis.edges import contact_edge, stick_edge
+from contactopt.analysis.zone import pressed, stuck
+from contactopt.bodies.body import Body
+from contactopt.errors import InputError
+from contactopt.interface.reduction import Reduction, reduce_bodies
+from contactopt.problem import InterfaceProblem, Solution
+from contactopt.scenes.scene import Scene
+from contactopt.solving.driver import solve
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """One converged state of a path.
+
+    q, s           of the step's problem: q_t is measured from the state before [length], [force]
+    displacements  u (k, dim), total: gap, tangential displacement [length];  slip (k, dim - 1) of this step [length]
+    apart          (dim,) relative displacement of the bodies, had they no contact: minus approach, shift [length]
+    elastic        elastic energy of both bodies; external: midpoint work of this step; contact: D [force length]
+    """
+
+    scene: Scene
+    solution: Solution
+    q: np.ndarray
+    s: np.ndarray
+    displacements: np.ndarray
+    slip: np.ndarray
+    apart: np.ndarray
+    elastic: float
+    external: float
+    contact: float
+
+    @property
+    def friction(self) -> float:
+        """Friction work of this step, sum mu r_n |du_t| [force length]."""
+        return -float(np.sum(self.solution.reactions[:, 1:] * self.slip))
+
+
+@dataclass(frozen=True, eq=False)
+class PathResult:
+    """A solved path; `reduction` belongs to its last state, with the problem of the last step.
+
+    If a step is not solved the path ends with it: what would follow has no state to start from.
+    """
+
+    states: tuple[State, ...]
+    reduction: Reduction
+
+    @property
+    def solved(self) -> bool:
+        return all(state.solution.solved for state in self.states)
+
+    @property
+    def solution(self) -> Solution:
+        """The last state's, with the seconds of the whole path."""
+        seconds = Counter(self.reduction.seconds)
+        for state in self.states:
+            seconds.update(state.solution.seconds)
+        return replace(self.states[-1].solution, seconds=dict(seconds))
+
+    def problem(self, step: int) -> InterfaceProblem:
+        """The static problem of one step, which its solution is certified against."""
+        return replace(self.reduction.problem, q=self.states[step].q, s=self.states[step].s)
+
+    @cached_property
+    def history(self) -> dict[str, np.ndarray]:
+        """One value per state (n,), energies summed from the unloaded bodies on.
+
+        normal_force, shear_force    that press and push the upper body on the lower, the latter along t1 [force]
+        approach, shift              of the bodies, in the same directions [length]
+        contact_half_width, stick_half_width [length];  contact_nodes, stick_nodes, slip_nodes
+        elastic_energy, external_work, friction_work, step_work [force length]: external_work is the sum of the others
+        energy_error                 of that sum in this step, relative to the largest work or energy so far
+        residual, iterations, seconds   of the solve
+        """
+        rows = [_row(self.reduction.problem, state) for state in self.states]
+        history = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        elastic = history["elastic_energy"]
+        error = np.abs(history["external_work"] - np.diff(elastic, prepend=0.0) - history["step_work"])
+        history["step_work"] = history["step_work"] - history["friction_work"]
+        for name in ("external_work", "friction_work", "step_work"):
+            history[name] = np.cumsum(history[name])
+        largest = np.maximum.accumulate(np.maximum(np.abs(history["external_work"]), elastic))
+        history["energy_error"] = np.divide(error, largest, out=np.zeros_like(error), where=largest > 0)
+        return history
+
+    def write(self, out: str | Path) -> None:
+        """history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and displacements (n, k, dim)."""
+        out = Path(out)
+        out.mkdir(parents=True, exist_ok=True)
+        problem = self.reduction.problem
+        with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=out) as staging:
+            with open(Path(staging) / "history.csv", "w", newline="") as file:
+                rows = csv.writer(file)
+                rows.writerow(self.history)
+                rows.writerows(zip(*self.history.values()))
+            np.savez(
+                Path(staging) / "path.npz",
+                coordinates=problem.coordinates,
+                areas=problem.areas,
+                reactions=[state.solution.reactions for state in self.states],
+                displacements=[state.displacements for state in self.states],
+            )
+            for file_path in Path(staging).iterdir():
+                os.replace(file_path, out / file_path.name)
+
+
+def follow(
+    scenes: Iterable[Scene],
+    elements: int | None = None,
+    zone: float | None = None,
+    note: Callable[[str], None] = lambda text: None,
+    Q: str = "auto",
+    solver: str = "auto",
+    **settings: Any,
+) -> PathResult:
+    """Solve a load path: the states of one scene in their order, from the unloaded bodies on.
+
+    scenes    that differ in their loads only: forces, tractions, prescribed displacements
+    elements, zone, Q, solver   as for reduce_bodies(): one mesh for the whole path, fine enough for all of its zones
+    settings  go to solve(), where each step starts from the solution of the one before
+    Raises InputError for an empty path or states that are not those of one scene.
+    """
+    states: list[State] = []
+    seconds: Counter[str] = Counter()
+    reduction: Reduction | None = None
+    last: _Mechanics | None = None
+    for scene in scenes:
+        reduction = reduce_bodies(scene, elements, zone, Q, solver) if reduction is None else reduction.loaded(scene)
+        seconds.update(reduction.seconds)
+        state, last = _step(reduction, states[-1] if states else None, last, settings)
+        states.append(state)
+        note(f"state {len(states)}: {state.solution.status}, {state.solution.iterations} iterations")
+        if not state.solution.solved:
+            break
+    if reduction is None:
+        raise InputError("the path has no states; give at least one scene.")
+    end = replace(reduction.problem, q=states[-1].q)
+    return PathResult(tuple(states), replace(reduction, problem=end, seconds=dict(seconds)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Mechanics:
+    """What energies are made of: contact forces r and displacements u, both (k, dim), of each body the displacements U
+    and the external forces F on them (of a rigid body those of its plate components), and the elastic energy."""
+
+    r: np.ndarray
+    u: np.ndarray
+    U: list[np.ndarray]
+    F: list[np.ndarray]
+    elastic: float = 0.0
+
+
+def _mechanics(reduction: Reduction, solution: Solution) -> _Mechanics:
+    """The state of the bodies under contact forces and plate displacements."""
+    problem, r = reduction.problem, solution.reactions
+    elastic, start = 0.0, 0
+    U: list[np.ndarray] = []
+    F: list[np.ndarray] = []
+    for body, nodes, sign, plates in zip(reduction.bodies, reduction.nodes, (1.0, -1.0), reduction.plates):
+        own = slice(start, start + plates)
+        start += plates
+        if body is None:
+            U.append(solution.multipliers[own])
+            F.append(problem.s[own])
+            continue
+        force = body.contact_force(nodes, reduction.frames, sign * r)
+        U.append(body.displacement(force, solution.multipliers[own]))
+        inner = body.body.A @ U[-1]
+        F.append(_external(body.body, inner))
+        elastic += float(U[-1] @ inner) / 2
+    return _Mechanics(r, problem.displacements(r, solution.multipliers), U, F, elastic)
+
+
+def _external(body: Body, inner: np.ndarray) -> np.ndarray:
+    """External forces (n,): loads on free unknowns, reactions of supports, and on each plate its total force."""
+    F = inner.copy()
+    F[body.free] = body.load[body.free]
+    total = body.thrust + body.motion.T @ body.load
+    return F + body.motion @ ((total - body.motion.T @ F) / body.motion.sum(axis=0))
+
+
+def _step(
+    reduction: Reduction, before: State | None, last: _Mechanics | None, settings: dict[str, Any]
+) -> tuple[State, _Mechanics]:
+    problem = reduction.problem
+    earlier = np.zeros((problem.contacts, problem.dim - 1)) if before is None else before.displacements[:, 1:]
+    q = problem.q.copy()
+    q[:, 1:] -= earlier
+    solution = solve(replace(problem, q=q), start=None if before is None else before.solution, **settings)
+    now, gap = _mechanics(reduction, solution), np.zeros(q.shape)
+    gap[:, 0] = reduction.gap
+    if last is None:  # the unloaded bodies
+        last = _Mechanics(0 * now.r, gap, [0 * U for U in now.U], [0 * F for F in now.F])
+    moved = problem.displacements(0 * now.r, solution.multipliers) - gap
+    state = State(
+        reduction.scene,
+        solution,
+        q,
+        problem.s,
+        now.u,
+        now.u[:, 1:] - earlier,
+        np.average(moved, axis=0, weights=problem.areas),
+        now.elastic,
+        external=sum(float((F + F0) @ (U - U0)) for F, F0, U, U0 in zip(now.F, last.F, now.U, last.U)) / 2,
+        contact=-float(np.sum((now.r + last.r) * (now.u - last.u))) / 2,
+    )
+    return state, now
+
+
+def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
+    r = state.solution.reactions
+    touching, sticking = pressed(r), stuck(r, problem.mu)
+    return {
+        "normal_force": float(r[:, 0].sum()),
+        "shear_force": -float(r[:, 1].sum()),
+        "approach": -float(state.apart[0]),
+        "shift": float(state.apart[1]),
+        "contact_half_width": contact_edge(state.scene, problem, r),
+        "stick_half_width": stick_edge(state.scene, problem, r, state.slip)[0],
+        "contact_nodes": int(touching.sum()),
+        "stick_nodes": int(sticking.sum()),
+        "slip_nodes": int((touching & ~sticking).sum()),
+        "elastic_energy": state.elastic,
+        "external_work": state.external,
+        "friction_work": state.friction,
+        "step_work": state.contact,
+        "residual": float(state.solution.residual),
+        "iterations": state.solution.iterations,
+        "seconds": float(sum(state.solution.seconds.values())),
+    }

@@ -1,0 +1,240 @@
+"""One elastic body as matrices: stiffness, loads, held and driven degrees of freedom, contact nodes.
+
+Finite elements of scikit-fem on the mesh that a Part gives, of the scene's degree. Every integral carries the weight of
+the scene's kind (thickness, 2 pi r, mirror images), so that forces and areas are those of the whole body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+import skfem
+from scipy.sparse.csgraph import connected_components
+from skfem.helpers import dot
+
+from contactopt.bodies.elements import SHAPES, contact_trace, make_basis, node_unknowns, straight, weight_at
+from contactopt.bodies.stiffness import stiffness
+from contactopt.errors import InputError
+from contactopt.material import Material
+from contactopt.scenes.scene import Part, Plate, Scene, Traction
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A discretised Part with n displacement unknowns, of which those in `free` are not prescribed.
+
+    A       (n, n) sparse stiffness; not singular on the free unknowns
+    load    (n,) nodal forces of tractions and body forces
+    lift    (n,) prescribed displacements of the supports, 0 elsewhere
+    motion  (n, p) unit motions of the p plate components that may move; zero on free unknowns
+    thrust  (p,) total forces on them
+    nodes   (k,) contact nodes on the candidate contact boundary
+    areas   (k,) nodal areas, the integrals of the hat functions over it
+    normals (dim, k) outward unit normals there, averaged over the facets
+    weights (k, nodes) what the displacement of the nodes contributes to that of the contacts (contactopt.bodies.elements)
+    """
+
+    name: str
+    material: Material
+    basis: skfem.CellBasis
+    weight: tuple[float, bool]
+    A: sp.csr_matrix
+    load: np.ndarray
+    lift: np.ndarray
+    free: np.ndarray
+    motion: np.ndarray
+    thrust: np.ndarray
+    nodes: np.ndarray
+    areas: np.ndarray
+    normals: np.ndarray
+    weights: sp.csr_matrix
+
+    @property
+    def degree(self) -> int:
+        """Of the displacement in every element, 1 or 2."""
+        return 1 if self.unknowns.shape[1] == self.basis.mesh.nvertices else 2
+
+    @cached_property
+    def unknowns(self) -> np.ndarray:
+        """Displacement unknowns of every node, (dim, n / dim); the vertices of the mesh come first."""
+        return node_unknowns(self.basis)
+
+    @property
+    def locations(self) -> np.ndarray:
+        """Coordinates of every node, (dim, n / dim)."""
+        return np.asarray(self.basis.doflocs[:, self.unknowns[0]])
+
+    @property
+    def points(self) -> np.ndarray:
+        """Coordinates of the contact nodes, (dim, k)."""
+        return self.locations[:, self.nodes]
+
+    @cached_property
+    def surface(self) -> np.ndarray:
+        """All nodes of the contact boundary, (m,)."""
+        return np.unique(self.weights.indices)
+
+    @property
+    def contact_dofs(self) -> np.ndarray:
+        """Displacement unknowns of all nodes of the contact boundary, (m, dim); m = k but for quadratic simplices."""
+        return np.asarray(self.unknowns[:, self.surface].T)
+
+
+def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Body:
+    """Mesh and assemble one Part of a Scene; raises InputError for a body that could move freely."""
+    mesh = part.build_mesh(elements, zone)
+    _check_mesh(scene, part, mesh)
+    axisymmetric = scene.kind == "axisymmetric"
+    factor = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}[scene.kind] * scene.copies
+    weight = (factor, axisymmetric)
+    basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, axisymmetric)
+    A = stiffness(basis, part.material, weight)
+    pieces = connected_components(A, directed=False)[0]
+    if pieces > 1:
+        raise InputError(
+            f"body '{part.name}': its mesh falls into {pieces} pieces; remove nodes that belong to no element, "
+            "merge duplicated nodes, or model each piece as a body of its own."
+        )
+    lift, held, motion, thrust = _constraints(scene, part, basis)
+    _check_rigid_modes(scene, part, basis, held)
+    contact = contact_trace(basis, scene.degree, mesh.boundaries[part.contact], weight)
+    return Body(
+        part.name,
+        part.material,
+        basis,
+        weight,
+        A,
+        _load(part, basis, weight),
+        lift,
+        np.flatnonzero(~held),
+        motion,
+        thrust,
+        *contact,
+    )
+
+
+def reload_body(body: Body, scene: Scene, part: Part) -> Body:
+    """The same body under the load values of another scene; InputError if other unknowns are held or driven there."""
+    lift, held, motion, thrust = _constraints(scene, part, body.basis)
+    if not np.array_equal(np.flatnonzero(~held), body.free) or not np.array_equal(motion, body.motion):
+        raise InputError(f"body '{part.name}': supports or plates hold other unknowns than before; reduce it anew.")
+    return replace(body, load=_load(part, body.basis, body.weight), lift=lift, thrust=thrust)
+
+
+def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
+    if not isinstance(mesh, skfem.Mesh) or mesh.p.shape[0] != scene.dim or mesh.refdom.__name__ not in SHAPES:
+        raise InputError(
+            f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension {scene.dim} made of "
+            f"triangles, quadrilaterals, tetrahedra or hexahedra; got {type(mesh).__name__}."
+        )
+    if not np.all(np.isfinite(mesh.p)):
+        raise InputError(f"body '{part.name}': the mesh has a node whose coordinates are not finite numbers.")
+    if scene.kind == "axisymmetric" and mesh.p[0].min() < -1e-12 * np.ptp(mesh.p[0]):
+        raise InputError(
+            f"body '{part.name}': an axisymmetric mesh lies in r >= 0; its least r is {mesh.p[0].min():g}."
+        )
+    known = mesh.boundaries or {}
+    names = [part.contact, *(s.boundary for s in part.supports)]
+    names += [load.boundary for load in part.loads if isinstance(load, (Traction, Plate))]
+    for name in names:
+        if name not in known or len(known[name]) == 0:
+            raise InputError(
+                f"body '{part.name}': the mesh has no boundary named {name!r} (or it is empty); "
+                f"it has {', '.join(sorted(known)) or 'none'}."
+            )
+
+
+def _load(part: Part, basis: skfem.CellBasis, weight: tuple[float, bool]) -> np.ndarray:
+    total = np.zeros(basis.N)
+    for load in part.loads:
+        if isinstance(load, Plate):
+            continue
+        value = np.asarray(load.value, dtype=float)
+
+        @skfem.LinearForm
+        def form(v, w, value=value):  # type: ignore[no-untyped-def]
+            return dot(value.reshape((-1, 1, 1)) * np.ones_like(v), v) * weight_at(weight, w.x)
+
+        where = basis.boundary(load.boundary) if isinstance(load, Traction) else basis
+        total += form.assemble(where)
+    return total
+
+
+def _constraints(scene: Scene, part: Part, basis: skfem.CellBasis) -> tuple[np.ndarray, ...]:
+    """Prescribed displacements, the mask of unknowns that are not free, plate motions and plate forces."""
+    lift, held = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
+    table = node_unknowns(basis)
+
+    def unknowns(boundary: str, component: str) -> np.ndarray:
+        there = basis.get_dofs(facets=np.asarray(basis.mesh.boundaries[boundary])).flatten()
+        return np.intersect1d(there, table[scene.components.index(component)])
+
+    for support in part.supports:
+        values = dict.fromkeys(scene.components, 0.0) if support.displacement is None else support.displacement
+        for component, value in values.items():
+            where = unknowns(support.boundary, component)
+            if np.any(held[where] & (lift[where] != value)):
+                raise InputError(
+                    f"body '{part.name}': the support on {support.boundary!r} prescribes {component} = {value:g} at a "
+                    "node where another support prescribes a different value."
+                )
+            lift[where], held[where] = value, True
+    columns, thrust = [], []
+    supported = held.copy()
+    for plate in (load for load in part.loads if isinstance(load, Plate)):
+        for component in scene.components:
+            where = unknowns(plate.boundary, component)
+            if component in plate.force:
+                if np.any(supported[where]):
+                    raise InputError(
+                        f"body '{part.name}': the plate on {plate.boundary!r} moves in {component}, but a support or "
+                        "another plate holds one of its nodes in that component."
+                    )
+                column = np.zeros(basis.N)
+                column[where] = 1.0
+                columns.append(column)
+                thrust.append(plate.force[component])
+            elif not plate.glued:
+                continue
+            elif np.any(lift[where] != 0):
+                raise InputError(
+                    f"body '{part.name}': a support moves the plate on {plate.boundary!r}, which holds {component}; "
+                    "drop the plate or the support."
+                )
+            held[where] = True
+        supported = held.copy()
+    motion = np.stack(columns, axis=1) if columns else np.zeros((basis.N, 0))
+    return lift, held, motion, np.array(thrust, dtype=float)
+
+
+def _check_rigid_modes(scene: Scene, part: Part, basis: skfem.CellBasis, held: np.ndarray) -> None:
+    """The motions of the body as a rigid whole must not all leave the held unknowns at rest."""
+    table = node_unknowns(basis)
+    x = basis.doflocs[:, table[0]]
+    x = x - x.mean(axis=1, keepdims=True)
+    x = x / np.abs(x).max()
+    names, modes = [], []
+    for i, component in enumerate(scene.components):
+        if not (scene.kind == "axisymmetric" and component == "r"):
+            modes.append(np.zeros_like(x))
+            modes[-1][i] = 1.0
+            names.append(f"translation along {component}")
+    if scene.kind != "axisymmetric":
+        for i in range(scene.dim):
+            for j in range(i):
+                modes.append(np.zeros_like(x))
+                modes[-1][i], modes[-1][j] = x[j], -x[i]
+                names.append(f"rotation in the {scene.components[j]}-{scene.components[i]} plane")
+    R = np.zeros((basis.N, len(modes)))
+    for column, mode in zip(R.T, modes):
+        column[table] = mode
+    values, vectors = np.linalg.eigh(R[held].T @ R[held])  # its kernel: the motions that nothing holds
+    if values[0] < 1e-12 * held.sum() or not held.any():
+        motion = names[int(np.argmax(np.abs(vectors[:, 0])))]
+        raise InputError(
+            f"body '{part.name}' is free to move ({motion}), so its stiffness is singular; "
+            "add a Support, or load it through a rigid Plate."
+        )

@@ -1,0 +1,51 @@
+"""Meshes with all elements halved, curved contact boundaries kept curved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from contactopt.bodies.elements import is_curved
+from contactopt.errors import InputError
+from contactopt.scenes.scene import Part, Scene
+
+
+def split(mesh: Any, contact: str) -> Any:
+    """The plane mesh with all elements halved, new nodes of a curved contact boundary on a cubic spline.
+
+    The spline gives the height over the coordinate along which the boundary extends most, so that partners on
+    two bodies stay partners. Raises InputError for meshes of solids (scikit-fem drops their boundaries) or of curved elements.
+    """
+    if is_curved(mesh) or len(mesh.p) > 2:
+        raise InputError(
+            "a given mesh can be refined only if it is plane with straight elements; give the part a function "
+            "(elements, zone) -> mesh instead."
+        )
+    fine = mesh.refined(1)
+    old, new = (np.unique(m.facets[:, m.boundaries[contact]]) for m in (mesh, fine))
+    along = int(np.argmax(np.ptp(mesh.p[:, old], axis=1)))
+    order = old[np.argsort(mesh.p[along, old])]
+    p = fine.p.copy()
+    p[1 - along, new] = CubicSpline(mesh.p[along, order], mesh.p[1 - along, order])(p[along, new])
+    return replace(fine, doflocs=p)
+
+
+def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
+    """The scene on the meshes made for `elements` and then halved `splits` times."""
+
+    def finer(part: Any) -> Any:
+        if not isinstance(part, Part):
+            return part
+
+        def mesh(_: int, zone: float | None) -> Any:
+            made = part.build_mesh(elements, zone)
+            for _ in range(splits):
+                made = split(made, part.contact)
+            return made
+
+        return replace(part, mesh=mesh)
+
+    return replace(scene, upper=finer(scene.upper), lower=finer(scene.lower)) if splits else scene

@@ -1,0 +1,36 @@
+"""Checks of numbers that a user gives, each with one sentence that says what is wrong."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import numpy as np
+
+from contactopt.errors import InputError
+
+
+def check_number(name: str, value: float, low: float = -np.inf, high: float = np.inf, closed: bool = False) -> None:
+    """Raise InputError unless value is a finite number in (low, high), or in [low, high) when `closed`."""
+    try:
+        good = isfinite(value) and (low <= value if closed else low < value) and value < high
+    except TypeError:
+        good = False
+    if not good:
+        bounds = []
+        if low > -np.inf:
+            bounds.append(f"{'at least' if closed else 'greater than'} {low:g}")
+        if high < np.inf:
+            bounds.append(f"less than {high:g}")
+        raise InputError(f"{name} must be a finite number {' and '.join(bounds)}".rstrip() + f"; got {value!r}.")
+
+
+def check_positive(**sizes: float) -> None:
+    """Raise InputError unless every size is a positive finite number."""
+    for name, value in sizes.items():
+        check_number(name.replace("_", " "), value, low=0.0)
+
+
+def check_count(name: str, value: int) -> None:
+    """Raise InputError unless the value is a whole number of at least 1."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise InputError(f"{name} must be a whole number of at least 1; got {value!r}.")

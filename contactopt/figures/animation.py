@@ -1,0 +1,125 @@
+"""Figures of load paths: the loop of force and displacement, energies, and both in motion with the tractions."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.analysis.paths import PathResult
+from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE, contact_line
+
+FRAMES = 10  # per second
+
+
+def loop(path: PathResult, ax: Any = None) -> Any:
+    """Shear force against shift where the path has a shear, else normal force against approach."""
+    ax = _axes(ax)
+    x, y, labels = _loop(path)
+    ax.plot(x, y, "o-", color=BLUE, ms=3, lw=1)
+    ax.plot(x[:1], y[:1], "o", color=GREEN, label="first state")
+    ax.plot(x[-1:], y[-1:], "s", color=ORANGE, label="last state")
+    ax.set(xlabel=labels[0], ylabel=labels[1])
+    ax.legend(frameon=False)
+    return ax
+
+
+def energies(path: PathResult, ax: Any = None) -> Any:
+    """Work since the first state: what did not become elastic energy, friction work, error of the steps."""
+    ax = _axes(ax)
+    since = {key: value - value[0] for key, value in path.history.items()}
+    state = np.arange(1, len(path.states) + 1)
+    lost = since["external_work"] - since["elastic_energy"]
+    ax.plot(state, lost, "o", color=GREY, ms=4, mfc="white", label="external work - elastic energy")
+    ax.plot(state, since["friction_work"], color=ORANGE, label="friction work")
+    ax.plot(state, since["step_work"], ":", color=GREEN, label="error of the steps")
+    force, length = _units(path)
+    ax.set(xlabel="state", ylabel=f"work since the first state [{force} {length}]")
+    ax.legend(frameon=False)
+    return ax
+
+
+def path_figure(path: PathResult) -> Any:
+    """Loop and energies side by side; a Figure."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10.8, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    loop(path, left)
+    energies(path, right)
+    scene = path.states[-1].scene
+    figure.suptitle(f"{scene.name}, mu = {scene.mu:g}: {len(path.states)} states")
+    return figure
+
+
+def animate(path: PathResult, file: str | Path) -> None:
+    """The path as a GIF: tangential traction within the friction bounds, and the point on the loop."""
+    from matplotlib.animation import FuncAnimation, PillowWriter
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.4, 3.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    left, right = figure.subplots(1, 2)
+    problem, scene = path.reduction.problem, path.states[-1].scene
+    line = contact_line(problem)
+    x, area = problem.coordinates[0, line], problem.areas[line]
+    bound = [problem.mu[line] * np.abs(s.solution.reactions[line, 0]) / area for s in path.states]
+    shear = [-s.solution.reactions[line, 1] / area for s in path.states]
+    peak = float(np.max(bound))
+    (upper,) = left.plot(x, bound[0], "--", color=GREY, lw=1, label="friction bound, +/- mu p")
+    (lower,) = left.plot(x, -bound[0], "--", color=GREY, lw=1)
+    (traction,) = left.plot(x, shear[0], "o-", color=BLUE, ms=2.5, lw=1, label="traction on the lower body")
+    where = ", y = 0" if problem.dim == 3 else ""
+    left.set(
+        xlabel=f"{scene.components[0]} [{scene.units[0]}]{where}",
+        ylabel=f"tangential traction [{scene.units[1]}]",
+        ylim=(-1.15 * peak, 1.45 * peak),
+    )
+    left.legend(frameon=False, fontsize=8, loc="upper right")
+    across, force, labels = _loop(path)
+    right.plot(across, force, color=GREY, lw=0.8)
+    (past,) = right.plot([], [], color=BLUE, lw=1.5)
+    (point,) = right.plot([], [], "o", color=ORANGE)
+    right.set(xlabel=labels[0], ylabel=labels[1])
+    figure.suptitle(f"{scene.name}, mu = {scene.mu:g}")
+
+    def draw(state: int) -> tuple[Any, ...]:
+        upper.set_ydata(bound[state])
+        lower.set_ydata(-bound[state])
+        traction.set_ydata(shear[state])
+        past.set_data(across[: state + 1], force[: state + 1])
+        point.set_data(across[state : state + 1], force[state : state + 1])
+        return upper, lower, traction, past, point
+
+    file = Path(file)
+    film = FuncAnimation(figure, draw, frames=len(path.states))
+    with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=file.parent) as staging:
+        film.save(Path(staging) / "film.gif", writer=PillowWriter(fps=FRAMES), dpi=80)
+        os.replace(Path(staging) / "film.gif", file)
+
+
+def _loop(path: PathResult) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:
+    history, (force, length) = path.history, _units(path)
+    sheared = np.ptp(history["shift"]) > 1e-6 * np.ptp(history["approach"])
+    keys = ("shift", "shear_force") if sheared else ("approach", "normal_force")
+    labels = f"{keys[0]} [{length}]", f"{keys[1].replace('_', ' ')} [{force}]"
+    return history[keys[0]], history[keys[1]], labels
+
+
+def _units(path: PathResult) -> tuple[str, str]:
+    """Names of the units of force and length."""
+    length, stress = path.states[0].scene.units
+    newton = (length, stress) in (("mm", "MPa"), ("m", "Pa"))
+    return "N" if newton else f"{stress} {length}$^2$", length
+
+
+def _axes(ax: Any) -> Any:
+    if ax is not None:
+        return ax
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(6.4, 4.8), layout="constrained").add_subplot()

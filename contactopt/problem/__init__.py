@@ -1,0 +1,22 @@
+"""The heart: the interface problem of frictional contact, its solution and its certificate. Optimisation only.
+
+Nothing here, or below in what it imports, knows finite elements.
+"""
+
+from contactopt.problem.certificate import balance_residual, fit_multipliers, natural_map_residual
+from contactopt.problem.chart import Chart
+from contactopt.problem.interface_problem import InterfaceProblem
+from contactopt.problem.scaling import Scales, dimensionless
+from contactopt.problem.solution import Solution, Status
+
+__all__ = [
+    "Chart",
+    "InterfaceProblem",
+    "Scales",
+    "Solution",
+    "Status",
+    "balance_residual",
+    "dimensionless",
+    "fit_multipliers",
+    "natural_map_residual",
+]

@@ -1,0 +1,57 @@
+"""The contact surface's own coordinates: what every reader of places on it uses, whatever way the bodies are turned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactopt.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Places of the k contacts on their surface, in coordinates that turn with it.
+
+    In 2D the one coordinate is the arc length along the contact line. In 3D the two coordinates are those of a tangent
+    plane. The origin is the centre of the surface: where a symmetry plane or an axis cuts it, the cut; otherwise the
+    middle.
+
+    places    (dim - 1, k) coordinates [length]
+    mirrored  (dim - 1,) whether the surface goes on beyond x_i = 0 as its own mirror image (a symmetry plane or an axis)
+    period    length of a contact line that is closed [length]; None where it has ends, and in 3D
+    Raises InputError on shapes that do not fit and on numbers that are not finite.
+    """
+
+    places: np.ndarray
+    mirrored: tuple[bool, ...]
+    period: float | None = None
+
+    def __post_init__(self) -> None:
+        places = np.array(self.places, dtype=float)
+        if places.ndim != 2 or len(places) != len(self.mirrored):
+            raise InputError(
+                f"a chart needs one row of places per direction; got shape {places.shape} for {len(self.mirrored)}."
+            )
+        if not np.all(np.isfinite(places)):
+            raise InputError("a chart holds a number that is not finite.")
+        places.setflags(write=False)
+        object.__setattr__(self, "places", places)
+
+    @classmethod
+    def of_points(cls, coordinates: np.ndarray, dim: int) -> Chart:
+        """The chart of bare points (d, k), of which nothing else is known: the directions in which they extend most.
+
+        Coordinates that are given on the surface already, d = dim - 1, are taken as they are. Otherwise the origin is the
+        middle of the points, the axes are their principal directions, and the sign of each axis is chosen so that its
+        largest component in space is positive.
+        """
+        count = dim - 1
+        if len(coordinates) <= count:
+            missing = np.zeros((count - len(coordinates), coordinates.shape[1]))
+            return cls(np.concatenate([coordinates, missing]), (False,) * count)
+        centred = coordinates - (coordinates.max(axis=1) + coordinates.min(axis=1))[:, None] / 2
+        axes = np.linalg.svd(centred, full_matrices=False)[0][:, :count]
+        axes = np.pad(axes, ((0, 0), (0, count - axes.shape[1])))
+        largest = axes[np.argmax(np.abs(axes), axis=0), np.arange(count)]
+        return cls((axes * np.where(largest < 0, -1.0, 1.0)).T @ centred, (False,) * count)

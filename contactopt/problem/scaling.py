@@ -1,0 +1,62 @@
+"""The dimensionless form of an interface problem, in which every method works."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contactopt.problem.interface_problem import InterfaceProblem
+from contactopt.problem.operators import NOISE, Interface, InterfaceOperator, diagonal
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Units in which a problem is dimensionless: force, length, and one length per multiplier."""
+
+    force: float
+    length: float
+    multipliers: np.ndarray
+
+    def to_physical(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return reactions * self.force, multipliers * self.multipliers
+
+    def to_dimensionless(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return reactions / self.force, multipliers / self.multipliers
+
+
+def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
+    """The same problem with mean diagonal of Q one, forces of order one and unit columns of V.
+
+    The force scale is the mean force that the balance asks of a node or, without a balance, the force that closes
+    the root-mean-square of q at one node. Every change of units of the input gives the same numbers here.
+    A component that cannot move (on a symmetry plane, say) carries no force that matters: a unit compliance there
+    makes that force zero instead of undetermined.
+    """
+    d = diagonal(problem.Q)
+    compliance = float(np.mean(d[d > 0])) if np.any(d > 0) else 1.0
+    columns = np.linalg.norm(problem.V, axis=0)
+    total = np.abs(problem.V).sum(axis=0)
+    resultant = np.divide(np.abs(problem.s), total, out=np.zeros(len(problem.s)), where=total > 0)
+    force = float(resultant.max(initial=0.0)) or float(np.sqrt(np.mean(problem.q**2))) / compliance or 1.0
+    length = force * compliance
+    columns = np.where(columns > 0, columns, 1.0)
+    implicit = isinstance(problem.Q, InterfaceOperator)
+    sizes = d if implicit else np.abs(problem.Q).max(axis=1)
+    moves = [sizes, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
+    rigid = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
+    Q: Interface
+    if isinstance(problem.Q, InterfaceOperator):
+        Q = problem.Q.scaled(1 / compliance, rigid.astype(float))
+    else:
+        entries = np.array(problem.Q / compliance)
+        entries[rigid, rigid] = 1.0
+        Q = entries
+    scaled = replace(
+        problem,
+        Q=Q,
+        q=problem.q / length,
+        V=problem.V / columns,
+        s=problem.s / (columns * force),
+    )
+    return scaled, Scales(force, length, length / columns)

@@ -1,0 +1,60 @@
+"""How a solve ended: status, last iterate, certificate, history."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+
+class Status(Enum):
+    """How a solve ended: a word for tables and a sentence for people."""
+
+    SOLVED = "solved", "the natural-map residual is at most the tolerance"
+    SETTLED = "settled", "the method ended by its own criterion, but the certificate is above the tolerance"
+    ITERATION_LIMIT = "iteration_limit", "the iterations ran out with the certificate above the tolerance"
+    TIME_LIMIT = "time_limit", "the time ran out with the certificate above the tolerance"
+    CYCLING = "cycling", "the iteration came back to an earlier state, so it cannot converge; try relaxation"
+    STALLED = "stalled", "the iterate no longer changes, but the certificate is above the tolerance"
+    DIVERGED = "diverged", "the iterates grew without bound; the last finite one is kept"
+    BACKEND_FAILED = "backend_failed", "a QP or conic backend gave no usable answer"
+
+    def __init__(self, label: str, sentence: str):
+        self.label = label
+        self.sentence = sentence
+
+    def __str__(self) -> str:
+        return self.label
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where a solve ended: always the last iterate, whatever the status.
+
+    reactions    (k, dim) nodal forces on the upper body, normal first [force]
+    multipliers  (p,) displacements lambda of the plates [length]
+    residual     the certificate: natural_map_residual(problem, reactions, multipliers)
+    history      one mapping per outer iteration: residual, change (of the tangential force), seconds and, where Q is an
+                 operator, products, the method's products with Q so far
+    seconds      phase -> time
+    """
+
+    reactions: np.ndarray
+    multipliers: np.ndarray
+    status: Status
+    residual: float
+    iterations: int
+    method: str
+    history: tuple[dict[str, float], ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
+    message: str = ""
+
+    @property
+    def products(self) -> int:
+        """Products with Q that the method took, of which the certificate has its own; 0 where Q is an array."""
+        return int(self.history[-1].get("products", 0)) if self.history else 0
+
+    @property
+    def solved(self) -> bool:
+        return self.status is Status.SOLVED

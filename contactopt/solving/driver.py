@@ -1,0 +1,168 @@
+"""The driver of every method: clock, stopping rule, history, limits, certificate."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from contactopt.checks import check_number
+from contactopt.errors import BackendError, InputError
+from contactopt.problem import InterfaceProblem, Scales, Solution, Status, dimensionless, natural_map_residual
+from contactopt.problem.operators import InterfaceOperator, loosened
+from contactopt.solving.methods import Method, default_method, find_method
+
+CYCLE = 12  # longest cycle that is looked for
+ROUGH = 1e-5  # accuracy of products in a rough certificate
+SAME = 1e-11  # relative distance at which two iterates are the same state
+CONFIRM = 8  # repeated states in a row after which a method is not going anywhere; some change course before that
+
+
+def solve(
+    problem: InterfaceProblem,
+    method: str | Method | None = None,
+    tol: float = 1e-8,
+    *,
+    max_iterations: int = 500,
+    time_limit: float = np.inf,
+    change_tol: float | None = None,
+    start: Solution | None = None,
+    progress: Callable[[int, float], None] | None = None,
+    **settings: Any,
+) -> Solution:
+    """Solve an interface problem; the answer's status is `solved` only if its certificate is at most `tol`.
+
+    method          a name (see `contactopt list`) with its `settings`, or a method object; None: `auto`, or `alternating`
+                    if the settings name a backend
+    tol             bound on natural_map_residual(problem, reactions, multipliers)
+    max_iterations, time_limit [s]   of the method, residual evaluation not counted
+    change_tol      the paper's criterion |r_t - r_t previous| / |r_t| <= change_tol (1e-5 there), None: not used. If
+                    it is met first the iteration ends, with status `settled` unless the certificate agrees
+    start           a solution of a problem of the same size, to start from instead of cold
+    progress        called with (iteration, residual) after each outer iteration
+    Raises InputError on arguments that make no sense, an unknown or missing backend, or a load that pulls the bodies
+    apart. A backend that fails while solving is a status, with the last iterate.
+    """
+    check_number("tol", tol, low=0.0)
+    check_number("max_iterations", max_iterations, low=0.0)
+    if change_tol is not None:
+        check_number("change_tol", change_tol, low=0.0)
+    if method is None or isinstance(method, str):
+        method = find_method(method or default_method(settings), **settings)
+    elif settings:
+        raise InputError(
+            f"settings {', '.join(settings)} belong to a method given by name; set them on the method object."
+        )
+    _check_equilibrium(problem)
+    if not getattr(method, "implicit", False):
+        problem = problem.explicit()
+    scaled, scales = dimensionless(problem)
+    recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)
+    operator = scaled.Q if isinstance(scaled.Q, InterfaceOperator) else None
+    message, status = "", Status.SETTLED
+    steps = method.iterate(scaled, None if start is None else _dimensionless_start(start, problem, scales))
+    while True:
+        begin = time.perf_counter()
+        try:
+            with np.errstate(all="ignore"):  # what overflows is seen below
+                iterate = next(steps, None)
+        except BackendError as error:
+            message, status = str(error), Status.BACKEND_FAILED
+            break
+        if iterate is None:
+            break
+        if not all(np.all(np.isfinite(part)) for part in iterate):
+            status = Status.DIVERGED
+            break
+        seconds = time.perf_counter() - begin
+        ended = recorder.record(*iterate, seconds, {} if operator is None else {"products": operator.products})
+        if ended is not None:
+            status = ended
+            break
+    if status is not Status.SOLVED and recorder.residual <= tol:
+        status = Status.SOLVED
+    return Solution(
+        recorder.reactions,
+        recorder.multipliers,
+        status,
+        recorder.residual,
+        len(recorder.history),
+        repr(method),
+        tuple(recorder.history),
+        {"solve": recorder.clock},
+        message or status.sentence,
+    )
+
+
+def _dimensionless_start(start: Solution, problem: InterfaceProblem, scales: Scales) -> tuple[np.ndarray, np.ndarray]:
+    if start.reactions.shape != problem.q.shape or start.multipliers.shape != problem.s.shape:
+        raise InputError(
+            f"start has reactions {start.reactions.shape} and {len(start.multipliers)} multipliers; this problem needs "
+            f"{problem.q.shape} and {len(problem.s)}."
+        )
+    return scales.to_dimensionless(start.reactions, start.multipliers)
+
+
+class _Recorder:
+    """Certificate, history and stopping rule of one solve; its clock counts the method's own time."""
+
+    def __init__(self, problem, scales, tol, change_tol, max_iterations, time_limit, progress):  # type: ignore[no-untyped-def]
+        self.problem, self.scales, self.tol, self.change_tol = problem, scales, tol, change_tol
+        self.max_iterations, self.time_limit, self.progress = max_iterations, time_limit, progress
+        self.reactions, self.multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
+        self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
+        self.history: list[dict[str, float]] = []
+        self.recent: list[np.ndarray] = [self.reactions]
+        self.clock = 0.0
+        self.repeated = 0
+
+    def _certificate(self) -> float:
+        """The natural-map residual; where products cost iterations, to a digit as long as it is far from the tolerance."""
+        rough = loosened(self.problem.Q, ROUGH)
+        if rough is not self.problem.Q:
+            residual = natural_map_residual(replace(self.problem, Q=rough), self.reactions, self.multipliers)
+            if residual > max(100 * ROUGH, 10 * self.tol):
+                return residual
+        return natural_map_residual(self.problem, self.reactions, self.multipliers)
+
+    def record(self, r: np.ndarray, lam: np.ndarray, seconds: float, counts: dict[str, float]) -> Status | None:
+        """Take one iterate (dimensionless); the status with which the solve ends, or None."""
+        self.clock += seconds
+        self.reactions, self.multipliers = self.scales.to_physical(r, lam)
+        self.residual = self._certificate()
+        change = _relative(self.reactions[:, 1:], self.recent[-1][:, 1:])
+        repeats = [m for m, old in enumerate(reversed(self.recent), 1) if _relative(self.reactions, old) < SAME]
+        self.recent = [*self.recent[1 - CYCLE :], self.reactions]
+        self.history.append({"residual": self.residual, "change": change, "seconds": self.clock} | counts)
+        if self.progress is not None:
+            self.progress(len(self.history), self.residual)
+        if self.residual <= self.tol:
+            return Status.SOLVED
+        if self.change_tol is not None and len(self.history) > 1 and change <= self.change_tol:
+            return Status.SETTLED
+        self.repeated = self.repeated + 1 if repeats else 0
+        if self.repeated >= CONFIRM:
+            return Status.STALLED if repeats[0] == 1 else Status.CYCLING
+        if len(self.history) >= self.max_iterations:
+            return Status.ITERATION_LIMIT
+        return Status.TIME_LIMIT if self.clock > self.time_limit else None
+
+
+def _relative(new: np.ndarray, old: np.ndarray) -> float:
+    size = float(np.linalg.norm(new))
+    return float(np.linalg.norm(new - old)) / size if size > 0 else float(np.linalg.norm(old) > 0)
+
+
+def _check_equilibrium(problem: InterfaceProblem) -> None:
+    """Contact only pushes: a plate that moves along the normals must be pressed on, not pulled off."""
+    if problem.bilateral:
+        return
+    V = problem.V.reshape(problem.contacts, problem.dim, -1)
+    for column, s in zip(np.moveaxis(V, 2, 0), problem.s):
+        size = np.abs(column).max(initial=0.0)
+        push = column[:, 0] * np.sign(s)  # what normal reactions add to s
+        if size > 0 and np.all(np.abs(column[:, 1:]) <= 1e-9 * size) and s != 0 and np.all(push >= -1e-9 * size):
+            raise InputError("the load on the plate pulls the bodies apart: no equilibrium; press them together.")

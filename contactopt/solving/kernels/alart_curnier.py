@@ -1,0 +1,112 @@
+"""Alart and Curnier's equations of Coulomb friction, their Newton steps, dense or by Krylov methods, and where to start.
+
+r = P(r - rho (Q r + V lambda + q)),  V' r + s = 0,  P the Coulomb map (contactopt.problem.cones.coulomb_map)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.linalg as la
+
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.cones import coulomb_map
+from contactopt.problem.operators import diagonal
+from contactopt.solving.kernels.bonded import Bonded
+from contactopt.solving.kernels.krylov import krylov_step, model_of
+from contactopt.solving.kernels.semismooth import RIDGE, Equations
+
+FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-4  # accuracy of an iterative step: the first, and the bounds of the others
+GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
+LOOSE = 0.5  # share of contacts that do not stick, up to which the bonded factorisation is cheaper than a new one
+
+Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
+# equations, error, balance, D, relative accuracy -> dr, dlambda or None
+Step = Callable[[Equations, np.ndarray, np.ndarray, np.ndarray, float], Iterate | None]
+
+
+def forcing(residual: float, last: float) -> float:
+    """Relative accuracy of the linear system that is worth its price."""
+    return FIRST if last == np.inf else min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2))
+
+
+def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = None, weight: float = 0.0) -> Equations:
+    """The Alart-Curnier equations of a problem, rho_i = 1 over the mean compliance of contact i."""
+    compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1) + weight
+    return Equations(
+        problem.Q,
+        problem.q,
+        problem.V,
+        problem.s,
+        lambda y: coulomb_map(y, problem.mu, problem.bilateral),
+        1 / np.maximum(compliance, 1e-3),
+        center,
+        weight,
+    )
+
+
+def bonded_factor(problem: InterfaceProblem) -> Bonded | None:
+    """The factorised bonded system where it pays: elastic bodies pressed together by a plate, Q of full rank."""
+    try:
+        return Bonded(problem.Q, problem.V) if len(problem.s) else None
+    except la.LinAlgError:
+        return None
+
+
+def krylov(problem: InterfaceProblem, preconditioner: str | None) -> tuple[Step, Step]:
+    """Newton's steps from products with Q, and those of the bonded solution: the same."""
+    P = model_of(problem, preconditioner)
+
+    def step(equations, error, balance, D, rtol):  # type: ignore[no-untyped-def]
+        return krylov_step(equations, P, error, balance, D, rtol)
+
+    return step, step
+
+
+def dense(problem: InterfaceProblem) -> tuple[Step, Step]:
+    """Newton's steps, and those of the bonded solution."""
+    factor = bonded_factor(problem)
+
+    def steps(ridge: float) -> Step:
+        return lambda equations, error, balance, D, rtol: newton_step(equations, factor, error, balance, D, ridge)
+
+    return steps(RIDGE), steps(GLUE)
+
+
+def newton_step(
+    equations: Equations,
+    factor: Bonded | None,
+    error: np.ndarray,
+    balance: np.ndarray,
+    D: np.ndarray,
+    ridge: float = RIDGE,
+) -> Iterate | None:
+    """One dense step, through the bonded system while few contacts are open or slip."""
+    loose = np.any(np.eye(D.shape[1]) != D, axis=(1, 2))
+    if factor is not None and loose.sum() <= LOOSE * len(loose):
+        try:
+            return factor.step(equations.rho, error, balance, D)
+        except (la.LinAlgError, np.linalg.LinAlgError):
+            pass
+    return equations.step(error, balance, D, ridge)
+
+
+def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
+    """The bonded solution: all contacts glued if a plate presses the bodies together, else those that would penetrate.
+
+    Without a plate no force at all, if its residual is smaller: forces that bond rigid bodies are of any size. On elastic
+    bodies Newton's method cycles from there, because it takes contacts for sliding before friction acts.
+    """
+    zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
+    glued = np.full(len(problem.q), problem.bilateral or len(problem.s) > 0) | (problem.q[:, 0] < 0)
+    if not glued.any():
+        return zero
+    D = np.where(glued[:, None, None], np.eye(problem.dim), 0.0)
+    glue = Equations(problem.Q, problem.q, problem.V, problem.s, lambda y: (np.where(glued[:, None], y, 0.0), D))
+    _, error, balance, D = glue.evaluate(*zero)
+    bonded = (step or dense(problem)[1])(glue, error, balance, D, FIRST)
+    if bonded is None or len(problem.s):
+        return bonded or zero
+    equations = coulomb_equations(problem)
+    return min(zero, bonded, key=lambda point: equations.evaluate(*point)[0])

@@ -1,0 +1,185 @@
+"""Newton steps from products with Q alone: PCG and GMRES preconditioned by the same step for a model of Q.
+
+A step solves  (I - D + D rho Q) dr + D rho V dlambda = error,  V' dr = -balance  (contactopt.solving.kernels.semismooth). Where D is
+symmetric (all contacts glued, the normal problem, Tresca friction) let U diag(delta) U' = D with delta > 0. Then
+
+    dr = U alpha + dr0,   dr0 = (I - U U') error,   (U'QU + B) alpha + U'V dlambda = U'error / (delta rho) - U'Q dr0,
+
+B = (1 - delta) / (delta rho), symmetric positive definite on the balance V'U alpha = -balance - V'dr0: projected PCG
+(Gould, Hribar, Nocedal 2001). Coulomb's D is not symmetric: GMRES. In both the preconditioner is the same system with Q
+replaced by its model G, whose products cost an FFT, solved by an inner iteration: if c1 G <= Q <= c2 G then the
+preconditioned system is that well conditioned whatever sticks, slips or is open. Q is needed once per iteration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import LinearOperator, cg, gmres
+
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.operators import loosened
+from contactopt.solving.kernels.semismooth import Equations
+from contactopt.solving.preconditioners import Preconditioner, deflated, preconditioner, restricted, smooth_motions
+
+FLAT = 1e-8  # eigenvalues of D below this are zero
+RESTART, CYCLES = 60, 3  # of GMRES
+PRODUCTS = 0.05  # accuracy of products, over that of the step
+INNER = 1e-3  # and of the model's GMRES, which costs next to nothing
+MODEL = 1e-4  # accuracy of the products that make the model
+SLIPPING = 0.5  # diagonal entries of D below this count as zero where only a rough inverse is asked for
+
+Step = tuple[np.ndarray, np.ndarray]  # dr (k, d), dlambda (p,)
+
+
+def model_of(problem: InterfaceProblem, name: str | None = None) -> Preconditioner:
+    """The preconditioner of that name with the smooth motions deflated; 'none': the identity.
+
+    None: `neumann` where the contacts lie on a grid, else the identity.
+    """
+    n = problem.q.size
+    if name != "none":
+        try:
+            P, Q = preconditioner(problem, name or "neumann"), loosened(problem.Q, MODEL)
+            return deflated(P, Q, smooth_motions(problem))
+        except InputError:
+            if name is not None:
+                raise
+    return Preconditioner(n, lambda x: x)
+
+
+def krylov_step(
+    equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
+) -> Step | None:
+    """dr (k, d), dlambda (p,) to that relative accuracy; None if the iteration does not get anywhere."""
+    symmetric = np.array_equal(D, D.transpose(0, 2, 1))
+    solve = _symmetric_step if symmetric else _unsymmetric_step
+    dr, multipliers = solve(equations, P, error, balance, D, rtol)
+    if not (np.all(np.isfinite(dr)) and np.all(np.isfinite(multipliers))):
+        return None
+    return dr, multipliers
+
+
+def _symmetric_step(
+    equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
+) -> Step:
+    Q, V = loosened(equations.Q, PRODUCTS * rtol), equations.V
+    U, delta, rho = _directions(D, equations.rho)
+    added = (1 - delta) / (delta * rho) + equations.weight
+    known = error.ravel() - U @ (U.T @ error.ravel())
+    right = (U.T @ error.ravel()) / (delta * rho)
+    if np.any(known):
+        right -= U.T @ (Q @ known)
+    W, b = U.T @ V, -balance - V.T @ known
+    m = len(delta)
+    if m == 0:
+        return known.reshape(error.shape), np.zeros(len(balance))
+    near = restricted(P, U, added)
+    Y = np.stack([near @ w for w in W.T], axis=1) if W.shape[1] else W
+    K = np.linalg.pinv(W.T @ Y)
+
+    def off(x: np.ndarray) -> np.ndarray:  # projection onto the balanced alpha
+        return x - Y @ (K @ (W.T @ x))
+
+    def off_t(x: np.ndarray) -> np.ndarray:
+        return x - W @ (K @ (Y.T @ x))
+
+    def product(x: np.ndarray) -> np.ndarray:
+        return U.T @ (Q @ (U @ x)) + added * x
+
+    start = Y @ (K @ b)
+    residual = right - product(start) if np.any(start) else right
+    system = LinearOperator((m, m), matvec=lambda x: off_t(product(off(x.ravel()))), dtype=float)
+    inverse = LinearOperator((m, m), matvec=lambda x: off(near @ off_t(x.ravel())), dtype=float)
+    size = max(np.linalg.norm(off_t(right)), np.linalg.norm(off_t(residual)))
+    beta, _ = cg(system, off_t(residual), rtol=0.0, atol=rtol * size, M=inverse, maxiter=RESTART * CYCLES)
+    alpha = start + off(beta)
+    multipliers = K @ (Y.T @ (right - product(alpha))) if len(b) else b
+    return (known + U @ alpha).reshape(error.shape), multipliers
+
+
+def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
+    """U (k d, m) with the eigenvectors of all D whose eigenvalues delta (m,) are positive, and rho (m,) of each."""
+    k, d = D.shape[:2]
+    values, vectors = np.linalg.eigh(D)
+    contact, which = np.nonzero(values > FLAT)
+    columns = vectors[contact, :, which]  # (m, d)
+    rows = (contact[:, None] * d + np.arange(d)).ravel()
+    m = len(contact)
+    U = sp.csr_matrix((columns.ravel(), (rows, np.repeat(np.arange(m), d))), (k * d, m))
+    U.eliminate_zeros()
+    return U, values[contact, which], rho[contact]
+
+
+def _unsymmetric_step(
+    equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
+) -> Step:
+    (k, d), p = error.shape, len(balance)
+    closed = np.flatnonzero(np.repeat(np.any(D != 0, axis=(1, 2)), d))
+    n = len(closed)
+    rho, V = equations.rho[:, None], equations.V
+    Q = loosened(equations.Q, PRODUCTS * rtol)
+    known = error.ravel().copy()
+    known[closed] = 0.0
+
+    def system(product: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+        def act(x: np.ndarray) -> np.ndarray:
+            dr = np.zeros(k * d)
+            dr[closed] = x[:n]
+            moved = product(dr) + V @ x[n:]
+            return np.concatenate([_rows(dr, moved)[closed], V.T @ dr])
+
+        return act
+
+    def _rows(dr: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        inner = dr.reshape(k, d) - rho * (moved.reshape(k, d) + equations.weight * dr.reshape(k, d))
+        return (dr.reshape(k, d) - np.einsum("kab,kb->ka", D, inner)).ravel()
+
+    right = np.concatenate([error.ravel()[closed], -balance - V.T @ known])
+    if np.any(known):
+        right[:n] -= _rows(known, Q @ known)[closed]
+    rough = _rough_inverse(P, closed, D, np.repeat(equations.rho, d)[closed], V[closed])
+    inverse = rough
+    if P.model is not None:
+        model = LinearOperator((n + p, n + p), matvec=system(lambda x: P.model @ x), dtype=float)
+        inverse = LinearOperator(
+            (n + p, n + p), matvec=lambda x: _gmres(model, x.ravel(), INNER * rtol, rough)[0], dtype=float
+        )
+    full = LinearOperator((n + p, n + p), matvec=system(lambda x: Q @ x), dtype=float)
+    x = _gmres(full, right, rtol, inverse)[0]
+    known[closed] = x[:n]
+    return known.reshape(k, d), x[n:]
+
+
+def _gmres(A: LinearOperator, b: np.ndarray, rtol: float, M: LinearOperator) -> tuple[np.ndarray, int]:
+    return gmres(A, b, rtol=rtol, restart=min(len(b), RESTART), maxiter=CYCLES, M=M)
+
+
+def _rough_inverse(
+    P: Preconditioner, closed: np.ndarray, D: np.ndarray, rho: np.ndarray, V: np.ndarray
+) -> LinearOperator:
+    """P where a component is held by contact, the identity where it slips, bordered by the balance."""
+    n, p = V.shape
+    inside = np.diagonal(D, axis1=1, axis2=2).ravel()[closed] > SLIPPING
+    unknowns = closed[inside]
+
+    def apply(x: np.ndarray) -> np.ndarray:
+        y = x.copy()
+        full = np.zeros(P.shape[0])
+        full[unknowns] = x[inside] / rho[inside]
+        y[inside] = (P @ full)[unknowns]
+        return y
+
+    border = rho[:, None] * V * inside[:, None]
+    Y = np.stack([apply(v) for v in border.T], axis=1) if p else V
+    K = np.linalg.pinv(V.T @ Y)
+
+    def solve(x: np.ndarray) -> np.ndarray:
+        y = apply(x[:n])
+        multipliers = K @ (V.T @ y - x[n:])
+        return np.concatenate([y - Y @ multipliers, multipliers])
+
+    return LinearOperator((n + p, n + p), matvec=lambda x: solve(x.ravel()), dtype=float)

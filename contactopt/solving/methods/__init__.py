@@ -1,0 +1,93 @@
+"""Methods: one file each, one line here. Nothing is imported before it is used.
+
+A method is a frozen dataclass whose fields are its settings. `iterate(problem, start)` takes a dimensionless
+InterfaceProblem and yields (reactions (k, dim), multipliers (p,)) after each outer iteration, from a cold start if
+`start` is None; the driver (contactopt.solve) owns the clock, the stopping rule, the history and the limits. A method
+that ends by itself has met its own criterion or cannot go on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import Any, Protocol
+
+import numpy as np
+
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem
+
+Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
+
+
+class Method(Protocol):
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]: ...
+
+    def backends(self, dim: int) -> tuple[str, str]:
+        """Names of its normal and tangential backend in `dim` dimensions, NATIVE where it needs none.
+
+        Raises InputError if one cannot be used.
+        """
+
+
+# name -> (module, class, what it is)
+METHODS = {
+    "auto": ("contactopt.solving.methods.auto", "Auto", "Newton, then cones and proximal where it fails; the default"),
+    "newton": ("contactopt.solving.methods.newton", "Newton", "semismooth Newton on the Alart-Curnier equations"),
+    "proximal": ("contactopt.solving.methods.proximal", "Proximal", "proximal-point loop around Newton"),
+    "tresca": ("contactopt.solving.methods.tresca", "Tresca", "successive convex problems with given friction bounds"),
+    "acary_cadoux": ("contactopt.solving.methods.cone", "AcaryCadoux", "fixed point on the SOCP over Coulomb's cones"),
+    "relaxation": (
+        "contactopt.solving.methods.cone",
+        "Relaxation",
+        "one SOCP: associated friction, another law (dilatancy)",
+    ),
+    "penalty": (
+        "contactopt.solving.methods.penalty",
+        "Penalty",
+        "penalty method, minimised exactly; error ~ 1 / factor",
+    ),
+    "lagrangian": (
+        "contactopt.solving.methods.lagrangian",
+        "Lagrangian",
+        "normal QP, then Uzawa's multipliers for friction",
+    ),
+    "augmented_lagrangian": (
+        "contactopt.solving.methods.augmented_lagrangian",
+        "AugmentedLagrangian",
+        "method of multipliers, exact or Uzawa",
+    ),
+    "nsgs": ("contactopt.solving.methods.nsgs", "NSGS", "nonsmooth Gauss-Seidel, contact by contact"),
+    "admm": ("contactopt.solving.methods.admm", "ADMM", "alternating direction method of multipliers"),
+    "apg": ("contactopt.solving.methods.apg", "APG", "accelerated projected gradient in a fixed point"),
+    "lemke": (
+        "contactopt.solving.methods.complementarity",
+        "Lemke",
+        "Lemke's method on the 2D complementarity problem; small",
+    ),
+    "alternating": (
+        "contactopt.solving.methods.alternating",
+        "Alternating",
+        "normal QP and tangential QP or SOCP in turn (paper, 5.1)",
+    ),
+}
+
+
+NATIVE = "native"  # in place of a backend's name: our own linear algebra
+
+
+def default_method(settings: Mapping[str, Any]) -> str:
+    """`auto`, or `alternating` where the settings name a backend."""
+    return "alternating" if settings.get("normal") or settings.get("tangential") else "auto"
+
+
+def find_method(name: str, **settings: Any) -> Method:
+    """The method of that name with its settings; InputError if there is no such method or setting."""
+    if name not in METHODS:
+        raise InputError(f"unknown method {name!r}; choose from {', '.join(METHODS)}.")
+    module, cls, _ = METHODS[name]
+    try:
+        method: Method = getattr(import_module(module), cls)(**settings)
+    except TypeError as error:
+        raise InputError(f"method '{name}': {error}.") from error
+    return method

@@ -1,0 +1,100 @@
+"""Alternating direction method of multipliers over Coulomb's cones, the slip term renewed in every iteration.
+
+    min  r'Qr/2 + (q + g n)' r    subject to  V'r + s = 0,  r = z,  |z_t| <= mu z_n,    g_i = mu_i |u_t,i|:
+r from one linear system with Q + rho I and the balance rows, z by projection, the scaled multiplier x of r = z by
+their difference; -rho x is the velocity u + g n, which renews g in every iteration. For fixed g this converges for
+every rho; with g renewed there is no proof, it needs no full rank of Q, but
+strong friction may defeat it (reports/robustness). Bilateral contact: r_n is free and the discs have the radius mu |r_n|. Cost: one factorisation of Q +
+rho I, 2 n^3/3 operations (LU, since a Q from a file need not be quite symmetric), and n^2 per iteration. rho is
+balanced after 10, 20, 40, ... iterations where that is worth a factorisation, so that the errors of r = z and of the
+velocity fall together.
+Sources: Acary, Cadoux, Lemarechal, Malick (2011) for the form with g; Boyd, Parikh, Chu, Peleato, Eckstein (2011),
+Distributed Optimization and Statistical Learning via ADMM, for the iteration and the balancing of rho.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from contactopt.checks import check_number
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.cones import coulomb_cone, disc
+from contactopt.solving.methods import NATIVE, Iterate
+
+OVER = 1.6  # over-relaxation, between 1.5 and 1.8 in the literature
+FIRST = 10  # iteration of the first balancing of rho
+CHANGE = 10.0  # largest factor by which rho changes at once
+WORTH = 2.0  # smallest factor that is worth a factorisation
+
+
+@dataclass(frozen=True)
+class ADMM:
+    """rho: first weight of r = z, in units of the mean compliance; balanced later."""
+
+    rho: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_number("the weight rho", self.rho, low=0.0)
+
+    def backends(self, dim: int) -> tuple[str, str]:
+        return NATIVE, NATIVE
+
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
+        z, multipliers = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
+        rho, count, check = self.rho, 0, FIRST
+        system = Balanced(problem, rho)
+        x = np.zeros_like(z) if start is None else -problem.displacements(z, multipliers) / rho
+        if start is not None and not problem.bilateral:
+            x[:, 0] -= problem.mu * np.linalg.norm(x[:, 1:], axis=1)
+        while True:
+            right = rho * (z - x) - problem.q
+            if not problem.bilateral:
+                right[:, 0] -= problem.mu * rho * np.linalg.norm(x[:, 1:], axis=1)
+            r, multipliers = system.solve(right, problem.s)
+            relaxed, old = OVER * r + (1 - OVER) * z, z
+            z = _project(relaxed + x, problem)
+            x = x + relaxed - z
+            yield z, multipliers
+            count += 1
+            if count == check:
+                check *= 2
+                primal = float(np.linalg.norm(r - z)) / max(float(np.linalg.norm(z)), 1e-300)
+                moved = (problem.Q @ z.ravel(), problem.q, rho * x)  # what the velocity is the difference of
+                dual = rho * float(np.linalg.norm(z - old)) / max(*(float(np.linalg.norm(m)) for m in moved), 1e-300)
+                factor = float(np.clip(np.sqrt(max(primal, 1e-300) / max(dual, 1e-300)), 1 / CHANGE, CHANGE))
+                if not 1 / WORTH < factor < WORTH:
+                    rho, x = rho * factor, x / factor
+                    system = Balanced(problem, rho)
+
+
+def _project(y: np.ndarray, problem: InterfaceProblem) -> np.ndarray:
+    if not problem.bilateral:
+        return coulomb_cone(y, problem.mu)
+    return np.concatenate([y[:, :1], disc(y[:, 1:], problem.mu * np.abs(y[:, 0]))], axis=1)
+
+
+class Balanced:
+    """(Q + rho I) r + V lambda = right, V' r + s = 0, factorised."""
+
+    def __init__(self, problem: InterfaceProblem, rho: float):
+        n = len(problem.Q)
+        matrix = problem.Q.T.copy()  # LAPACK factorises the transpose of a C array in place
+        matrix[np.arange(n), np.arange(n)] += rho
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", la.LinAlgWarning)  # an indefinite Q: the driver sees what comes of it
+            self.factor = la.lu_factor(matrix.T, overwrite_a=True, check_finite=False)
+        self.V = problem.V
+        self.motions = la.lu_solve(self.factor, problem.V, check_finite=False)
+        self.schur = problem.V.T @ self.motions
+
+    def solve(self, right: np.ndarray, s: np.ndarray) -> Iterate:
+        r = la.lu_solve(self.factor, right.ravel(), check_finite=False)
+        if len(s) == 0:
+            return r.reshape(right.shape), np.zeros(0)
+        multipliers = np.linalg.lstsq(self.schur, self.V.T @ r + s, rcond=None)[0]
+        return (r - self.motions @ multipliers).reshape(right.shape), multipliers

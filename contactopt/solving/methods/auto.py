@@ -1,0 +1,114 @@
+"""The default, without a number to choose: Newton's method, and where it fails cones, then the proximal loop.
+
+1. Newton's method from the bonded solution (or no force at all) while its residual falls: elastic bodies end here
+   (reports/newton_steps), each step one dense linear system.
+2. CONES iterations of the Acary-Cadoux fixed point: convex programs, which no cycle and no rank deficiency of Q disturbs.
+3. The proximal loop from there, which needs no symmetric Q and no backend.
+4. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
+   contact forces drawn at random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
+   friction may have solutions that repel the loop and others that attract it.
+It ends where the driver's certificate or limits say so. There is no proof that it finds a solution: Coulomb's problem
+may have none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass
+from itertools import count, islice
+from typing import ClassVar
+
+import numpy as np
+
+from contactopt.errors import BackendError
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.cones import coulomb_cone
+from contactopt.problem.operators import InterfaceOperator
+from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations
+from contactopt.solving.methods import NATIVE, Iterate
+from contactopt.solving.methods.cone import AcaryCadoux
+from contactopt.solving.methods.newton import Newton
+from contactopt.solving.methods.proximal import Proximal
+from contactopt.solving.preconditioners import find_preconditioner
+
+LIMIT = 25  # Newton steps
+PATIENCE = 6  # of them without progress
+PROGRESS = 0.9  # a residual that falls by less is no progress
+CONES = 5  # cone programs
+ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
+LARGER = 3.0  # random starts, over the root-mean-square force of the point left
+
+
+@dataclass(frozen=True)
+class Auto:
+    """preconditioner: of Newton's steps where Q is an operator; None: the best that fits the contacts."""
+
+    preconditioner: str | None = None
+    implicit: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        find_preconditioner(self.preconditioner)
+
+    def backends(self, dim: int) -> tuple[str, str]:
+        return NATIVE, NATIVE
+
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
+        reached = yield from self._newton(problem, start, self.preconditioner)
+        problem = problem.explicit()  # all that follows looks at the entries of Q
+        reached = yield from self._cones(problem, reached)
+        random = np.random.default_rng(0)
+        for restarts in count():
+            last = yield from self._proximal(problem, reached, ROUND * 2**restarts)
+            r = random.normal(size=problem.q.shape)
+            r[:, 0] = np.abs(r[:, 0])
+            r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
+            reached = coulomb_cone(r, problem.mu), last[1]
+
+    @staticmethod
+    def _newton(
+        problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
+    ) -> Generator[Iterate, None, Iterate]:
+        """Newton's iterates; returns the best. What comes next needs the entries of Q: not before they cost no more."""
+        best, reached, since = np.inf, start, 0
+        operator = problem.Q if isinstance(problem.Q, InterfaceOperator) else None
+        for steps, (point, residual) in enumerate(Newton(preconditioner=preconditioner).steps(problem, start)):
+            yield point
+            since = 0 if residual < PROGRESS * best else since + 1
+            if residual < best:
+                best, reached = residual, point
+            tired = since >= PATIENCE or steps >= LIMIT
+            if tired and (operator is None or operator.products >= problem.q.size):
+                break
+        return reached or cold_start(problem)
+
+    @staticmethod
+    def _cones(problem: InterfaceProblem, start: Iterate) -> Generator[Iterate, None, Iterate]:
+        """A few cone programs; returns the best point, `start` if there was none better."""
+        if problem.bilateral:
+            return start
+        equations = coulomb_equations(problem)
+        best, reached = equations.evaluate(*start)[0], start
+        try:
+            for point in islice(AcaryCadoux().iterate(problem), CONES):
+                yield point
+                residual = equations.evaluate(*point)[0]
+                best, reached = min((best, reached), (residual, point), key=lambda pair: pair[0])
+        except BackendError:  # no answer: the proximal loop needs none
+            pass
+        return reached
+
+    @staticmethod
+    def _proximal(problem: InterfaceProblem, start: Iterate, patience: int) -> Generator[Iterate, None, Iterate]:
+        """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last."""
+        equations = coulomb_equations(problem)
+        best, target, point = np.inf, np.inf, start
+        for done, point in enumerate(Proximal().iterate(problem, start), start=1):
+            yield point
+            best = min(best, equations.evaluate(*point)[0])
+            if done % patience == 0:
+                if best > target:
+                    break
+                target = best / 2
+        if point is start:  # not a single subproblem could be solved from there
+            yield point
+        return point

@@ -1,0 +1,73 @@
+"""Semismooth Newton method on the Alart-Curnier equations, the primal-dual active set method for Coulomb friction.
+
+Solves r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 with P the Coulomb map (contactopt.problem.cones.coulomb_map): each step
+sorts the contacts into open, sticking and slipping and solves one linear system of the closed ones: dense, n^3/3 to
+2 n^3/3 operations, or, where Q is an operator, by PCG and GMRES to the accuracy that the step is worth (Eisenstat, Walker
+1996), some ten products with Q each (contactopt.solving.kernels.krylov). Full steps from the bonded solution; the number of steps hardly depends on the mesh
+(reports/newton_steps). Not globally convergent: rank-deficient Q (rigid bodies, redundant contacts) or strong
+friction may make it cycle, which is what `proximal` is for.
+Sources: Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm for
+three-dimensional contact problems with Coulomb friction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.operators import InterfaceOperator, loosened
+from contactopt.solving.kernels.alart_curnier import FIRST, cold_start, coulomb_equations, dense, forcing, krylov
+from contactopt.solving.methods import NATIVE, Iterate
+from contactopt.solving.preconditioners import find_preconditioner
+
+SHARP = 1e-4  # accuracy of a residual, over the residual that the step aimed at
+
+
+@dataclass(frozen=True)
+class Newton:
+    """linear: 'dense' or 'krylov', which needs products with Q only; None: as Q is an array or an operator.
+
+    preconditioner of krylov: a name (see contactopt.solving.preconditioners) or 'none'; None: the best that fits the contacts.
+    """
+
+    linear: str | None = None
+    preconditioner: str | None = None
+    implicit: ClassVar[bool] = True  # takes an operator for Q
+
+    def __post_init__(self) -> None:
+        if self.linear not in (None, "dense", "krylov"):
+            raise InputError(f"unknown linear solver {self.linear!r}; choose dense or krylov.")
+        find_preconditioner(self.preconditioner)
+
+    def backends(self, dim: int) -> tuple[str, str]:
+        return NATIVE, NATIVE
+
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
+        for point, _ in self.steps(problem, start):
+            yield point
+
+    def steps(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[tuple[Iterate, float]]:
+        """Iterates with the residual of the equations that each step began with."""
+        implicit = self.linear == "krylov" or (self.linear is None and isinstance(problem.Q, InterfaceOperator))
+        if not implicit:
+            problem = problem.explicit()
+        equations = coulomb_equations(problem)
+        step, first = krylov(problem, self.preconditioner) if implicit else dense(problem)
+        r, multipliers = cold_start(problem, first) if start is None else start
+        last, rtol = np.inf, FIRST
+        while True:
+            aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
+            equations.Q = loosened(problem.Q, SHARP * aim)
+            residual, error, balance, D = equations.evaluate(r, multipliers)
+            # P(y): at the solution equal to r, and within the bounds to the last digit
+            yield (r + error, multipliers), residual
+            rtol = forcing(residual, last)
+            change = step(equations, error, balance, D, rtol)
+            if change is None:
+                return
+            r, multipliers, last = r + change[0], multipliers + change[1], residual

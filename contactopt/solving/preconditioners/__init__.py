@@ -1,0 +1,161 @@
+"""Preconditioners of the interface operator Q = S1^-1 + S2^-1: approximate inverses of Q, O(k log k) per product.
+
+Paper, section 5.2: the H^1/2 seminorm of a function on the contact line, extended by zero (E) to a closed curve of 2m
+nodes, is a circulant matrix Q_c (27), the H^1 norm another, L_c (28); with m the smallest power of two >= k,
+    P21 = E' Q_c E   (25),      P22 = (E' L_c^-1 Q_c E)^-1   (26),
+up to a factor that no iteration sees. P21 resembles S1 + S2; the matrix that P22 inverts resembles Q itself. In 3D
+the sum of P21 along both directions of the contact surface is P31 (29). Extension by zero belongs to functions that
+vanish at the ends (H00^1/2), which a traction at a free edge does not:
+    `neumann`, the square root of the Laplacian of the contact line or surface by cosine transforms (contactopt.solving.preconditioners.neumann),
+needs no extension. Each acts on every component by itself. What is left are a few smooth motions of the two bodies against
+each other, first of all the sway of a slender body: `deflated` solves for them exactly (balancing, Mandel 1993).
+
+Restriction to an active set A: the paper takes the rows and columns A of P. Where P = G^-1 with a cheap product G, which
+`neumann` has, deflated or not, G_AA is the better model: c1 G <= Q <= c2 G holds on every subspace with the same constants,
+so that (G_AA)^-1, by an inner PCG that needs no body, has the condition number of P on any active set (`restricted`).
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import LinearOperator, cg
+
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.operators import Interface, diagonal, held
+from contactopt.solving.preconditioners.grid import Product, grid_of
+
+ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an active set
+
+
+class Preconditioner(LinearOperator):
+    """P (n, n), an approximate inverse of Q; model: G = P^-1 by cheap products, None where there is no such thing."""
+
+    def __init__(self, n: int, product: Product, model: Product | None = None):
+        super().__init__(np.dtype(float), (n, n))
+        self.product = product
+        self.model = None if model is None else LinearOperator((n, n), matvec=model, rmatvec=model, dtype=float)
+
+    def _matvec(self, x: np.ndarray) -> np.ndarray:
+        return np.asarray(self.product(x.ravel()))
+
+    def _rmatvec(self, x: np.ndarray) -> np.ndarray:
+        return self._matvec(x)
+
+
+# name -> (module, function of the grid of contacts giving P and, where it is cheap, P^-1, what it is)
+PRECONDITIONERS = {
+    "p21": (
+        "contactopt.solving.preconditioners.circulant",
+        "p21",
+        "circulant H^1/2 seminorm, extended by zero (paper, eqs (25) and, in 3D, (29))",
+    ),
+    "p22": (
+        "contactopt.solving.preconditioners.circulant",
+        "p22",
+        "inverse of the circulant H^-1/2 form, extended by zero (paper, eq (26)), 2D",
+    ),
+    "neumann": (
+        "contactopt.solving.preconditioners.neumann",
+        "neumann",
+        "square root of the Neumann Laplacian, by the cosine transform",
+    ),
+}
+
+
+def find_preconditioner(name: str | None) -> None:
+    """InputError unless there is a preconditioner of that name; None and 'none' are choices of the methods."""
+    if name not in (None, "none", *PRECONDITIONERS):
+        raise InputError(f"unknown preconditioner {name!r}; choose from {', '.join(PRECONDITIONERS)}.")
+
+
+def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
+    """The named approximate inverse of problem.Q, (k dim, k dim).
+
+    Uses of Q only its mean diagonal and which components cannot move.
+    Raises InputError for an unknown name, fewer than 3 contacts a side, or contacts not on a line or rectangular grid.
+    """
+    find_preconditioner(name)
+    still = held(problem.Q)
+    mean = float(np.mean(diagonal(problem.Q)[~still])) if not still.all() else 1.0
+    grid, order = grid_of(problem, still.reshape(problem.q.shape))
+    module, function, _ = PRECONDITIONERS[name]
+    product, inverse = getattr(import_module(module), function)(grid)
+
+    def on_grid(act: Product, factor: float) -> Product:
+        def apply(x: np.ndarray) -> np.ndarray:
+            sorted_ = np.where(still, 0.0, x).reshape(problem.q.shape)[order]
+            out = np.empty(problem.q.shape)
+            out[order] = act(sorted_.reshape(*grid.shape, problem.dim)).reshape(problem.q.shape)
+            return np.where(still, x, factor * out.ravel())  # what cannot move is on its own
+
+        return apply
+
+    model = None if inverse is None else on_grid(inverse, mean)
+    return Preconditioner(problem.q.size, on_grid(product, 1 / mean), model)
+
+
+def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
+    """(k dim, j <= dim^2): constant and linear functions of the place in every component: translations, tilts, stretches.
+
+    Components that cannot move stay at rest; what is then no motion of its own is left out.
+    """
+    place = problem.coordinates[: problem.dim - 1]
+    place = place - place.mean(axis=1, keepdims=True)
+    functions = [np.ones(problem.contacts), *(x / (np.abs(x).max() or 1.0) for x in place)]
+    Z = np.concatenate([np.kron(f[:, None], np.eye(problem.dim)) for f in functions], axis=1)
+    Z[held(problem.Q)] = 0.0
+    _, R = np.linalg.qr(Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300))
+    return Z[:, np.abs(np.diag(R)) > 1e-3]
+
+
+def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
+    """P made exact on the columns of Z (n, j): c (I - Z A^-1 Z'Q) P (I - Q Z A^-1 Z') + Z A^-1 Z' with A = Z'QZ.
+
+    The factor c puts the eigenvalues of P Q about 1, where those of the exact part are. Needs j + 1 products with Q once;
+    each application adds O(n j). Its inverse is the block secant update of P^-1 = G (Schnabel 1983),
+    G/c - G/c Z (Z'G/c Z)^-1 Z'G/c + QZ A^-1 (QZ)'.
+    """
+    QZ = np.asarray(Q @ Z)
+    A = Z.T @ QZ
+    A = np.linalg.inv((A + A.T) / 2)
+    x = np.random.default_rng(0).normal(size=len(Z))
+    x -= Z @ (A @ (QZ.T @ x))
+    Qx = np.asarray(Q @ x)
+    c = float(x @ Qx) / float(Qx @ (P @ Qx))
+
+    def apply(x: np.ndarray) -> np.ndarray:
+        coarse = A @ (Z.T @ x)
+        y = c * (P @ (x - QZ @ coarse))
+        return np.asarray(y - Z @ (A @ (QZ.T @ y)) + Z @ coarse)
+
+    model = P.model
+    if model is None:
+        return Preconditioner(len(Z), apply)
+    GZ = np.stack([model @ z for z in Z.T], axis=1) / c
+    B = np.linalg.inv(Z.T @ GZ)
+    return Preconditioner(len(Z), apply, lambda x: model @ x / c - GZ @ (B @ (GZ.T @ x)) + QZ @ (A @ (QZ.T @ x)))
+
+
+def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> LinearOperator:
+    """An approximate inverse of U'QU + diag(added), for U (n, m) with orthonormal columns and added (m,) >= 0.
+
+    U selects the unknowns of an active set, or directions in which contacts may still move. With a model G of Q,
+    (U'GU + diag(added))^-1 by an inner PCG; without, U'PU (paper, section 5.2).
+    """
+    m = U.shape[1]
+    rows = LinearOperator((m, m), matvec=lambda x: U.T @ (P @ (U @ x.ravel())), dtype=float)
+    if P.model is None:
+        return rows
+    model = P.model
+    system = LinearOperator((m, m), matvec=lambda x: U.T @ (model @ (U @ x.ravel())) + added * x.ravel(), dtype=float)
+    return LinearOperator((m, m), matvec=lambda x: cg(system, x.ravel(), rtol=ACTIVE, M=rows)[0], dtype=float)
+
+
+def selection(n: int, unknowns: np.ndarray) -> sp.csr_matrix:
+    """U (n, m) whose columns are the unit vectors of these unknowns (m,)."""
+    m = len(unknowns)
+    return sp.csr_matrix((np.ones(m), (unknowns, np.arange(m))), (n, m))

@@ -1,0 +1,75 @@
+"""The paper's circulant preconditioners P21, P22 and P31 (section 5.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.fft import irfft, rfft
+from scipy.sparse.linalg import LinearOperator, cg
+
+from contactopt.errors import InputError
+from contactopt.solving.preconditioners.grid import Grid, Product
+
+INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
+
+
+def seminorm(m: int) -> np.ndarray:
+    """First column (2m,) of the sparse circulant matrix of the H^1/2 seminorm, eq (27); about log2 m entries.
+
+    Its rows sum to zero where m is a power of two: constants are the kernel of a seminorm.
+    """
+    column, top = np.zeros(2 * m), int(np.ceil(np.log2(m)))
+    column[0] = 2 * np.sum(1 / np.arange(1, 2**top) ** 2.0)
+    for i in range(1, top + 1):
+        j = 2**i - 1
+        if j < m:
+            column[[j, -j]] -= np.sum(1 / np.arange(2 ** (i - 1), 2**i) ** 2.0)
+    return column
+
+
+def norm(m: int, h: float) -> np.ndarray:
+    """First column (2m,) of the circulant matrix of the H^1 norm, eq (28)."""
+    column = np.zeros(2 * m)
+    column[0], column[[1, -1]] = 2 / h + h, -1 / h
+    return column
+
+
+def p21(grid: Grid) -> tuple[Product, None]:
+    """Eq (25): E' Q_c E on a line; on a rectangle the sum of it along both directions, P31, eq (29)."""
+    lines = [restricted_circulant(rfft(seminorm(closed_curve(k))).real, k, axis) for axis, k in enumerate(grid.shape)]
+    return lambda X: np.sum([line(X) for line in lines], axis=0), None
+
+
+def p22(grid: Grid) -> tuple[Product, Product]:
+    """Eq (26): (E' L_c^-1 Q_c E)^-1, a Toeplitz system solved by conjugate gradients; on a line only.
+
+    h is the spacing over a quarter of the contact line's length, so that units do not matter.
+    """
+    if len(grid.shape) > 1:
+        raise InputError("preconditioner 'p22' is for contact lines (2D); in 3D choose p21 or neumann.")
+    (k,) = grid.shape
+    m = closed_curve(k)
+    symbol = rfft(seminorm(m)).real / rfft(norm(m, 4 / (k - 1))).real
+    product, guess = restricted_circulant(symbol, k, 0), p21(grid)[0]
+    toeplitz = LinearOperator((k, k), matvec=lambda x: product(x.reshape(k, 1))[:, 0], dtype=float)
+    near = LinearOperator((k, k), matvec=lambda x: guess(x.reshape(k, 1))[:, 0], dtype=float)
+
+    def solve(X: np.ndarray) -> np.ndarray:
+        return np.stack([cg(toeplitz, x, rtol=INNER, maxiter=500, M=near)[0] for x in X.T], axis=1)
+
+    return solve, product
+
+
+def closed_curve(k: int) -> int:
+    """Half the number of nodes of the closed curve: a power of two, at least k."""
+    return int(2 ** np.ceil(np.log2(k)))
+
+
+def restricted_circulant(symbol: np.ndarray, k: int, axis: int) -> Product:
+    """E' C E along one axis of k nodes for the circulant matrix with that (real, symmetric) symbol."""
+    n = 2 * (len(symbol) - 1)
+
+    def product(X: np.ndarray) -> np.ndarray:
+        lines = np.moveaxis(X, axis, -1)
+        return np.moveaxis(irfft(symbol * rfft(lines, n=n), n=n)[..., :k], -1, axis)
+
+    return product

@@ -1,0 +1,116 @@
+"""The grid of the contacts, and `neumann`: the square root of the Laplacian on it by cosine transforms.
+
+Free ends of a contact line or surface are even (a traction does not vanish there), ends where a plane of symmetry or an
+axis holds a component are odd: cosine and sine transforms. On a line the spacing does not matter: in terms of nodal
+forces the kernel of Q is log |x_i - x_j|, a function of the node numbers up to smooth terms. On a surface it is
+1 / |x_i - x_j|; uneven directions have their own eigenvectors there, a matrix as small as one side of the grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+from scipy.fft import dct, dst, idct, idst
+
+from contactopt.solving.preconditioners.grid import EVEN, Grid, Product, cells_along
+
+SPLIT = 0.3  # Poisson's ratio of the model half-space
+SOFT = 0.28  # what bilinear elements add for the shortest waves; best on reports/preconditioners
+# held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j + shift) / k
+TRANSFORMS = {
+    (False, False): (dct, idct, 2, 0.0),
+    (True, False): (dst, idst, 4, 0.5),
+    (False, True): (dct, idct, 4, 0.5),
+    (True, True): (dst, idst, 2, 1.0),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """The Laplacian -d^2/dx^2 along one side: transform to its eigenvectors and back, along an axis of an array.
+
+    waves  (k,) squared wave numbers over that of the grid, 0 to 4;   squares  (k,) eigenvalues [1 / length^2]
+    """
+
+    waves: np.ndarray
+    squares: np.ndarray
+    forward: Callable[[np.ndarray, int], np.ndarray]
+    backward: Callable[[np.ndarray, int], np.ndarray]
+
+
+def direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
+    """The Laplacian along `ticks`, odd at the ends that are held; on a line as if they were even."""
+    to, back, kind, shift = TRANSFORMS[bool(held[0]), bool(held[1])]
+    k, steps = len(ticks), np.diff(ticks)
+    waves = 4 * np.sin(np.pi * (np.arange(k) + shift) / (2 * k)) ** 2
+    if line or np.ptp(steps) <= EVEN * steps.mean():
+        return Direction(
+            waves,
+            waves / steps.mean() ** 2,
+            lambda x, axis: to(x, type=kind, axis=axis, norm="ortho"),
+            lambda x, axis: back(x, type=kind, axis=axis, norm="ortho"),
+        )
+    cells, stiffness = cells_along(ticks), np.zeros(k)
+    stiffness[:-1] += 1 / steps
+    stiffness[1:] += 1 / steps
+    stiffness[[0, -1]] += 2 / steps[[0, -1]] * held
+    values, vectors = la.eigh_tridiagonal(stiffness / cells, -1 / steps / np.sqrt(cells[:-1] * cells[1:]))
+
+    def along(matrix: np.ndarray) -> Callable[[np.ndarray, int], np.ndarray]:
+        return lambda x, axis: np.moveaxis(np.tensordot(matrix, x, (1, axis)), 0, axis)
+
+    return Direction(waves, np.maximum(values, 0.0), along(vectors.T), along(vectors))
+
+
+def neumann(grid: Grid) -> tuple[Product, Product]:
+    """Square root of the Laplacian of the contacts, weighted by their sizes, and its inverse.
+
+    Its zero, the constants, is half the smallest other value.
+    """
+    parts = [_root(grid, component) for component in range(len(grid.held))]
+    weight = grid.weights.reshape(grid.shape)
+
+    def along(power: int) -> Product:
+        def product(X: np.ndarray) -> np.ndarray:
+            out = np.empty(X.shape)
+            for i, (root, directions) in enumerate(parts):
+                x = weight**power * X[..., i]
+                for axis, d in enumerate(directions):
+                    x = d.forward(x, axis)
+                x = root**power * x
+                for axis, d in enumerate(directions):
+                    x = d.backward(x, axis)
+                out[..., i] = weight**power * x
+            return out
+
+        return product
+
+    return along(1), along(-1)
+
+
+def _root(grid: Grid, component: int) -> tuple[np.ndarray, list[Direction]]:
+    """Square root of the symbol of a component, without units, and the directions.
+
+    On a surface the Laplacian is that of bilinear elements, x + y - x y / 6 (a + 1 / a) / (...) in their waves. A half-space
+    gives way differently to tangential tractions that vary along their own direction and across it, by 1 - nu to 1, and
+    bilinear elements more so the shorter the wave.
+    """
+    held = grid.held[component]
+    directions = [direction(t, h, len(grid.ticks) == 1) for t, h in zip(grid.ticks, held)]
+    waves = np.meshgrid(*(d.waves for d in directions), indexing="ij")
+    squares = sum(np.meshgrid(*(d.squares for d in directions), indexing="ij"))
+    spacing = [np.ptp(t) / (len(t) - 1) for t in grid.ticks]
+    total = np.maximum(sum(waves), 1e-300)
+    if len(waves) == 2:
+        (x, y), a = waves, spacing[1] / spacing[0]
+        squares = squares * (1 - (a + 1 / a) / 6 * x * y / np.maximum(a * x + y / a, 1e-300))
+    root = np.sqrt(squares * np.prod(spacing) ** (2 / len(waves)))
+    if 0 < component <= len(waves):
+        own = waves[component - 1]
+        root /= 1 - own / total * ((SPLIT if len(waves) == 2 else 0.0) + SOFT * own / 4)
+    if root.flat[0] <= 1e-6 * root.flat[1]:
+        root.flat[0] = np.partition(root.ravel(), 1)[1] / 2
+    return root, directions
