@@ -16,7 +16,6 @@ from contactopt.benchmark.figures import _pareto, fitted_exponent
 from contactopt.benchmark.report import read_layout
 from contactopt.benchmark.store import COLUMNS
 from contactopt.cli import main
-from tests.test_architecture import ROOT, imports
 from tests.test_benchmark import SMALL, written
 
 CAMPAIGNS = Path(__file__).parents[1] / "experiments" / "campaigns"
@@ -135,12 +134,6 @@ def test_profiles_compare_within_one_law():
         tables.select(rows, colour="red")
     with pytest.raises(InputError, match="no row"):
         tables.select(rows, method="c")
-
-
-def test_figures_and_tables_cannot_solve():
-    for name in ("figures", "tables"):
-        inner = {i for i in imports(ROOT / "benchmark" / f"{name}.py") if i.startswith("contactopt.")}
-        assert all(i.startswith(("contactopt.benchmark.tables", "contactopt.errors")) for i in inner)
 
 
 EXPERIMENT = (
