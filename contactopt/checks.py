@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
@@ -34,3 +35,19 @@ def check_count(name: str, value: int) -> None:
     """Raise InputError unless the value is a whole number of at least 1."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
         raise InputError(f"{name} must be a whole number of at least 1; got {value!r}.")
+
+
+def real_array(name: str, value: Any) -> np.ndarray:
+    """A copy of the value as an array of finite floats; InputError on text, ragged lists, complex or missing numbers."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise InputError(f"{name} must be an array of numbers; its rows have different lengths.") from error
+    if array.dtype.kind == "c":
+        raise InputError(f"{name} must be real; got complex numbers.")
+    if array.dtype.kind not in "biuf" and array.size:
+        raise InputError(f"{name} must be an array of numbers; got {type(value).__name__} of {array.dtype}.")
+    numbers = np.array(array, dtype=float)
+    if not np.all(np.isfinite(numbers)):
+        raise InputError(f"{name} holds a number that is not finite.")
+    return numbers

@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
+from contactopt.problem.laws.coulomb import Coulomb
 
 
 def _h5py() -> Any:
@@ -51,10 +52,13 @@ def write(problem: InterfaceProblem, path: str | Path, title: str = "", descript
     """Write a problem in FCLib's local form; read() gives back the same numbers.
 
     With a balance (V, s) it is the mixed form u = W r + V lambda + q, R u-part zero: groups V, R and vectors/s.
-    The file appears complete or not at all. Raises InputError for bilateral contact, which FCLib cannot express.
+    The file appears complete or not at all. Raises InputError for other laws than Coulomb's, which FCLib cannot express.
     """
-    if problem.bilateral:
-        raise InputError("FCLib has no bilateral contact; this problem cannot be written.")
+    law = problem.law
+    if not (law.unilateral and law.proportional) or law.dilatant:
+        raise InputError(
+            f"FCLib knows Coulomb's law only; this problem has {type(law).__name__} and cannot be written."
+        )
     h5py = _h5py()
     path = Path(path)
     handle, name = tempfile.mkstemp(suffix=".hdf5", dir=path.parent)
@@ -82,8 +86,8 @@ def _read_local(group: Any) -> InterfaceProblem:
     if "V" in group and "R" in group:
         if _read_matrix(group["R"]).nnz:
             raise InputError("its equality block R is not zero, which is not supported")
-        return InterfaceProblem(W, q, mu, _read_matrix(group["V"]).toarray(), np.ravel(group["vectors/s"][()]))
-    return InterfaceProblem(W, q, mu)
+        return InterfaceProblem(W, q, Coulomb(mu), _read_matrix(group["V"]).toarray(), np.ravel(group["vectors/s"][()]))
+    return InterfaceProblem(W, q, Coulomb(mu))
 
 
 def _read_global(group: Any) -> InterfaceProblem:
@@ -95,7 +99,7 @@ def _read_global(group: Any) -> InterfaceProblem:
     X = factors.solve(H.toarray())
     W = H.T @ X
     q = H.T @ factors.solve(np.ravel(group["vectors/f"][()]).astype(float)) + w.ravel()
-    return InterfaceProblem(W, q.reshape(-1, dim), mu)
+    return InterfaceProblem(W, q.reshape(-1, dim), Coulomb(mu))
 
 
 def _vectors(group: Any, name: str) -> tuple[int, np.ndarray, np.ndarray]:

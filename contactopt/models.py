@@ -132,27 +132,24 @@ def tangential(problem: InterfaceProblem, facets: int | None = None) -> Program:
 
 
 def tresca(problem: InterfaceProblem, facets: int | None = None) -> Program:
-    """min r' Q r / 2 + q' r   subject to  r_n >= 0 (not if bilateral),  |r_t| <= g,  V' r + s = 0.
+    """min r' Q r / 2 + q' r   subject to  r_n >= 0 where contacts may open,  |r_t| <= g,  V' r + s = 0.
 
-    Coulomb's law where g = mu |r_n|. Variable r (k dim,), normal first in each block; parameter g (k,); multipliers
+    Tresca's law where g is its limit, Coulomb's law where g = mu |r_n|. Variable r (k dim,), normal first in each block; parameter g (k,); multipliers
     "gap", "slip", "approach".
     """
     r, r_n, r_t, cost, balance, approach = _parts(problem)
     g = cp.Parameter(problem.contacts, nonneg=True)
     law, slip, _ = _friction(r_t, g, facets)
-    push = r_n >= 0
-    gap = (lambda: np.zeros(problem.contacts)) if problem.bilateral else (lambda: _dual(push))
-    laws = [law] if problem.bilateral else [push, law]
-    return Program(
-        cp.Problem(cp.Minimize(cost), [*laws, *balance]), {"r": r}, {"g": g}, {"gap": gap, "slip": slip} | approach
-    )
+    push, gap = _push(r_n, problem.law.lowest == 0)
+    readers = {"gap": gap, "slip": slip} | approach
+    return Program(cp.Problem(cp.Minimize(cost), [*push, law, *balance]), {"r": r}, {"g": g}, readers)
 
 
 def associated(problem: InterfaceProblem, facets: int | None = None) -> Program:
     """min r' Q r / 2 + q' r   subject to  r in Coulomb's cones |r_t| <= mu r_n,  V' r + s = 0.
 
     Its optimality conditions are those of friction with an associated flow rule: contacts that slip also open, by
-    u_n = mu |u_t|. Variable r (k dim,); multipliers "gap" (so opened), "slip", "approach". InputError if bilateral.
+    u_n = mu |u_t|. Variable r (k dim,); multipliers "gap" (so opened), "slip", "approach". InputError without such cones.
     """
     return _over_cones(problem, None, facets)
 
@@ -161,7 +158,7 @@ def acary_cadoux(problem: InterfaceProblem, facets: int | None = None) -> Progra
     """min r' Q r / 2 + (q + mu s n)' r   subject to  r in Coulomb's cones,  V' r + s_plates = 0.
 
     u_n + mu s is at least mu |u_t|, so that Coulomb's law holds where s = |u_t|. Variable r (k dim,); parameter s (k,),
-    zero unless set; multipliers "gap" u_n, "slip" u_t, "approach". InputError if bilateral.
+    zero unless set; multipliers "gap" u_n, "slip" u_t, "approach". InputError without such cones.
     Source: Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb friction problem via
     convex optimization.
     """
@@ -249,8 +246,8 @@ def _parts(problem: InterfaceProblem) -> tuple[Any, Any, Any, Any, list[Any], di
 
 
 def _over_cones(problem: InterfaceProblem, s: Any, facets: int | None) -> Program:
-    if problem.bilateral:
-        raise InputError("contact without separation has no cone of forces: use `tresca` or `bilateral`.")
+    if not (problem.law.unilateral and problem.law.proportional):
+        raise InputError("this law has no cone of forces |r_t| <= mu r_n: use `tresca` or `bilateral`.")
     r, r_n, r_t, cost, balance, approach = _parts(problem)
     law, slip, size = _friction(r_t, cp.multiply(problem.mu, r_n), facets)
     push = r_n >= 0  # follows from the cone unless mu = 0
@@ -278,6 +275,20 @@ def _friction(t: Any, g: Any, facets: int | None = None) -> tuple[Any, Reader, R
         D, reach = np.stack([np.cos(angle), np.sin(angle)], axis=1), float(np.cos(np.pi / (facets or 1)))
     polygon = D @ t <= reach * np.ones((len(D), 1)) @ cp.reshape(g, (1, k), order="F")
     return polygon, lambda: -_dual(polygon).T @ D, lambda: reach * _dual(polygon).sum(axis=0)
+
+
+def _push(r_n: Any, apart: np.ndarray) -> tuple[list[Any], Reader]:
+    """r_n >= 0 at the contacts that may open, a mask (k,), and the reader of the gap (k,), zero at the others."""
+    if not apart.any():
+        return [], lambda: np.zeros(len(apart))
+    push = (r_n if apart.all() else r_n[np.flatnonzero(apart)]) >= 0
+
+    def gap() -> np.ndarray:
+        out = np.zeros(len(apart))
+        out[apart] = _dual(push)
+        return out
+
+    return [push], gap
 
 
 def _balance(resultant: Any, name: str) -> tuple[list[Any], dict[str, Reader]]:

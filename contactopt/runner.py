@@ -161,7 +161,7 @@ def _summary(
         "scene": scene.name,
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
-        "mu": float(scene.mu),
+        "mu": float(scene.mu if isinstance(scene.mu, (int, float)) else problem.mu.mean()),
         "method": method,
         "normal_backend": backends[0],
         "tangential_backend": backends[1],

@@ -68,7 +68,7 @@ class Model:
 def model(scene: Scene, elements: int | None = None) -> Model:
     """Number a scene of two elastic bodies in plane strain; InputError for what the deck cannot say."""
     parts = scene.upper, scene.lower
-    if scene.kind != "plane-strain" or scene.degree != 1 or scene.bilateral:
+    if scene.kind != "plane-strain" or scene.degree != 1 or scene.law != "coulomb":
         raise InputError("the deck is written for unilateral contact in plane strain at degree 1 only.")
     if not all(isinstance(part, Part) for part in parts):
         raise InputError("the deck needs two elastic bodies; make the rigid one elastic.")

@@ -54,7 +54,7 @@ def scene(lines: Lines, mu: float, bilateral: bool) -> Scene:
     plate = Plate("top", {"y": -1.0}, glued=False)
     upper = Part("punch", punch, MATERIAL, (axis,), (plate,))
     lower = Part("base", base, MATERIAL, (axis, Support("bottom", {"y": 0.0})))
-    return Scene("corner", upper, lower, mu, copies=2, bilateral=bilateral)
+    return Scene("corner", upper, lower, mu, copies=2, law="bilateral" if bilateral else "coulomb")
 
 
 def solved(lines: Lines, n: int, mu: float, bilateral: bool):  # type: ignore[no-untyped-def]

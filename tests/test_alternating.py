@@ -3,6 +3,7 @@ import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
+from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.solving.methods.alternating import Alternating
 
 CYCLING = (-10.0, 1.0)
@@ -89,7 +90,7 @@ def test_bilateral_contact():
 
 def test_bilateral_contact_holds_against_pulling():
     base = reduce(scenes.flat_punch(2, elements=5, bilateral=True, mu=0.2))
-    pulled = InterfaceProblem(base.Q, base.q, base.mu, base.V, -base.s, bilateral=True)
+    pulled = InterfaceProblem(base.Q, base.q, Bilateral(base.mu), base.V, -base.s)
     solution = solve(pulled, tol=1e-10, method="alternating")
     assert solution.solved and solution.reactions[:, 0].sum() == pytest.approx(-100)
 

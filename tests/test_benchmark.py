@@ -295,14 +295,13 @@ def test_a_method_of_ones_own_takes_less_than_twenty_lines(tmp_path):
     mine = """
 import numpy as np
 from contactopt.benchmark import method
-from contactopt.problem.cones import friction_cone
 
 @method
 def fixed_point(problem, tol=1e-8, steps=20000):
     r, rho = np.zeros(problem.q.shape), 1 / np.linalg.norm(problem.Q, 2)
     for _ in range(steps):
         u = (problem.Q @ r.ravel()).reshape(r.shape) + problem.q
-        new = friction_cone(r, u, rho, problem.mu, False)
+        new = problem.law.natural_map(r, u, rho)
         if np.linalg.norm(new - r) <= tol * np.linalg.norm(new) / 100:
             break
         r = new

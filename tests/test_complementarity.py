@@ -7,6 +7,7 @@ from conftest import one_contact
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
 from contactopt.analysis.enumeration import all_solutions
 from contactopt.problem import dimensionless
+from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.solving.methods.complementarity import Lemke, complementarity_problem, lemke
 
 
@@ -126,14 +127,14 @@ def test_a_system_in_rest_and_units():
     "problem",
     [
         InterfaceProblem(np.eye(3), np.zeros((1, 3)), 0.3),
-        InterfaceProblem(np.eye(2), np.zeros((1, 2)), 0.3, bilateral=True),
+        InterfaceProblem(np.eye(2), np.zeros((1, 2)), Bilateral(0.3)),
         InterfaceProblem(np.eye(602), np.zeros((301, 2)), 0.3),
     ],
 )
 def test_problems_it_cannot_take(problem):
-    with pytest.raises(InputError, match="2D unilateral problem of at most"):
+    with pytest.raises(InputError, match="needs a 2D problem of at most|does not solve the law Bilateral"):
         solve(problem, Lemke())
-    with pytest.raises(InputError, match="2D unilateral problem of at most"):
+    with pytest.raises(InputError, match="2D problem of Coulomb's law with at most"):
         all_solutions(problem)
 
 

@@ -8,6 +8,7 @@ from contactopt import InputError, InterfaceProblem, fclib, natural_map_residual
 from contactopt.errors import BackendError
 from contactopt.problem import dimensionless
 from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative
+from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.solving.backends.direct import CoulombSOCP
 from contactopt.solving.methods.cone import AcaryCadoux, Relaxation, cone_program
 
@@ -49,7 +50,7 @@ def test_both_bridges_agree(dim):
     s = np.linspace(0, 0.5, problem.contacts)
     c = problem.q + np.outer(problem.mu * s, np.eye(dim)[0])
     raw = CoulombSOCP.using(problem.Q, problem.mu, problem.V, problem.s).solve(c.ravel())
-    a, b = (cone_program(problem, bridge, "clarabel")(s) for bridge in ("clarabel", "cvxpy"))
+    a, b = (cone_program(problem, bridge, "clarabel")(problem.mu * s) for bridge in ("clarabel", "cvxpy"))
     assert np.allclose(a[0], b[0], atol=1e-10) and np.allclose(a[1], b[1], atol=1e-10)
     assert np.allclose(raw[0], a[0].ravel(), atol=1e-5) and np.allclose(raw[1], a[1], atol=1e-5)
 
@@ -130,8 +131,8 @@ def test_other_conic_backends_through_cvxpy():
 
 @pytest.mark.parametrize("method", [AcaryCadoux(), Relaxation(), AcaryCadoux("cvxpy")])
 def test_contact_without_separation_names_methods_that_handle_it(method):
-    problem = InterfaceProblem(np.eye(2), np.ones((1, 2)), 0.3, bilateral=True)
-    with pytest.raises(InputError, match="'auto', 'newton', 'tresca' or 'alternating'"):
+    problem = InterfaceProblem(np.eye(2), np.ones((1, 2)), Bilateral(0.3))
+    with pytest.raises(InputError, match="does not solve the law Bilateral; these do: auto, newton, proximal, tresca"):
         solve(problem, method)
 
 

@@ -8,6 +8,7 @@ from contactopt import InputError, InterfaceProblem, natural_map_residual, reduc
 from contactopt.analysis.diagnosis import diagnose
 from contactopt.analysis.enumeration import all_solutions
 from contactopt.problem import Solution, Status
+from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.solving.methods.alternating import Alternating
 from contactopt.solving.methods.tresca import Tresca
 
@@ -235,7 +236,7 @@ def test_the_punch_prints_in_a_few_lines(punch):
         (InterfaceProblem(np.eye(2), [[-1.0, 5.0]], 0.5), "not tight"),  # slips, without any coupling in Q
         (InterfaceProblem(np.eye(2), [[1.0, 0.2]], 0.5), "tight"),  # opens wide
         (InterfaceProblem(np.eye(2), [[0.1, 5.0]], 0.5), "not tight"),  # opens, by less than mu |u_t|
-        (InterfaceProblem(np.eye(2), [[-1.0, 0.2]], 0.5, bilateral=True), "none"),
+        (InterfaceProblem(np.eye(2), [[-1.0, 0.2]], Bilateral(0.5)), "none"),
     ],
 )
 def test_relaxation(problem, expected):

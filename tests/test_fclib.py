@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, InterfaceProblem, fclib, natural_map_residual, solve
+from contactopt.problem.laws.bilateral import Bilateral
 
 h5py = pytest.importorskip("h5py")
 FOLDER = Path(__file__).parents[2] / "shared" / "fclib"
@@ -111,7 +112,7 @@ def test_malformed_files_are_refused_by_name(make, words, tmp_path):
 
 
 def test_bilateral_contact_cannot_be_written(tmp_path):
-    problem = InterfaceProblem(np.eye(2), np.zeros((1, 2)), 0.3, bilateral=True)
-    with pytest.raises(InputError, match="bilateral"):
+    problem = InterfaceProblem(np.eye(2), np.zeros((1, 2)), Bilateral(0.3))
+    with pytest.raises(InputError, match="Bilateral"):
         fclib.write(problem, tmp_path / "x.hdf5")
     assert not list(tmp_path.iterdir())

@@ -5,6 +5,8 @@ import qpsolvers
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, models
+from contactopt.problem.laws.bilateral import Bilateral
+from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.solving.backends import CONIC, QP
 from contactopt.solving.backends.conic import Conic
 
@@ -182,7 +184,9 @@ def test_plate_that_is_dragged_belongs_to_the_tangential_program():
 
 @pytest.mark.parametrize("bilateral", [False, True])
 def test_tresca_program_gives_both_laws_at_once(problem, bilateral):
-    problem = InterfaceProblem(problem.Q, problem.q, problem.mu, problem.V, problem.s, bilateral=bilateral)
+    problem = InterfaceProblem(
+        problem.Q, problem.q, (Bilateral if bilateral else Coulomb)(problem.mu), problem.V, problem.s
+    )
     program = models.tresca(problem)
     g = 0.2 * np.arange(problem.contacts)
     program.parameters["g"].value = g
@@ -221,9 +225,9 @@ def test_acary_cadoux_shifts_the_gap(problem):
 
 
 def test_cones_of_contact_without_separation_are_refused():
-    problem = InterfaceProblem(np.eye(2), np.zeros((1, 2)), 0.3, bilateral=True)
+    problem = InterfaceProblem(np.eye(2), np.zeros((1, 2)), Bilateral(0.3))
     for name in ("associated", "acary_cadoux"):
-        with pytest.raises(InputError, match="without separation"):
+        with pytest.raises(InputError, match="no cone of forces"):
             getattr(models, name)(problem)
 
 

@@ -13,7 +13,8 @@ from contactopt import InputError, InterfaceProblem, natural_map_residual, reduc
 from contactopt.benchmark.problems import rigid_bodies as random_rigid_bodies
 from contactopt.benchmark.problems import tangential
 from contactopt.problem import dimensionless
-from contactopt.problem.cones import coulomb_map
+from contactopt.problem.laws.bilateral import Bilateral
+from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.scenes import make_scene
 from contactopt.solving.kernels.alart_curnier import coulomb_equations
 from contactopt.solving.kernels.bonded import Bonded
@@ -29,10 +30,11 @@ SMALL = {"punch-2d": 16, "punch-3d": 5, "sphere": 12}
 def test_derivative_of_the_coulomb_map_is_the_difference_quotient(dim, bilateral):
     rng = np.random.default_rng(0)
     y, mu = rng.normal(size=(60, dim)), rng.uniform(0, 2, 60)
-    _, D = coulomb_map(y, mu, bilateral)
+    law = (Bilateral if bilateral else Coulomb)(mu)
+    _, D = law.project(y)
     for j in range(dim):
         step = 1e-7 * np.eye(dim)[j]
-        quotient = (coulomb_map(y + step, mu, bilateral)[0] - coulomb_map(y - step, mu, bilateral)[0]) / 2e-7
+        quotient = (law.project(y + step)[0] - law.project(y - step)[0]) / 2e-7
         assert np.allclose(D[:, :, j], quotient, atol=1e-6)
 
 
@@ -44,7 +46,7 @@ def test_newton_step_solves_the_linearised_equations(p):
     A = rng.normal(size=(k * d, k * d))
     Q, V = A @ A.T / 10 + np.eye(k * d), rng.normal(size=(k * d, p))
     rho, mu = rng.uniform(0.5, 2, k), np.full(k, 0.6)
-    equations = Equations(Q, rng.normal(size=(k, d)), V, rng.normal(size=p), lambda y: coulomb_map(y, mu), rho)
+    equations = Equations(Q, rng.normal(size=(k, d)), V, rng.normal(size=p), Coulomb(mu).project, rho)
     r, lam = rng.normal(size=(k, d)) + np.eye(d)[0], rng.normal(size=p)
     _, error, balance, D = equations.evaluate(r, lam)
     assert {0.0} < {float(np.abs(block).max()) for block in D}  # open and closed contacts both occur

@@ -4,8 +4,8 @@ from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, reduce, scenes, solve
 from contactopt.problem import dimensionless, natural_map_residual
-from contactopt.problem.cones import coulomb_cone_derivative, disc_derivative
-from contactopt.solving.kernels.balance import cylinder_derivative, project_balanced
+from contactopt.problem.cones import coulomb_cone_derivative, cylinder_derivative, disc_derivative
+from contactopt.solving.kernels.balance import project_balanced
 from contactopt.solving.methods.augmented_lagrangian import AugmentedLagrangian
 from contactopt.solving.methods.lagrangian import Lagrangian
 from contactopt.solving.methods.penalty import Penalty
@@ -145,7 +145,7 @@ def test_balanced_projection_is_the_nearest_balanced_point(law, dim):
     mu = np.where(np.arange(k) == 0, 0.0, 0.6)
     project = {
         "cone": lambda y: coulomb_cone_derivative(y, mu),
-        "cylinder": lambda y: cylinder_derivative(y, mu, False),
+        "cylinder": lambda y: cylinder_derivative(y, mu),
         "disc": lambda y: disc_derivative(y, mu),
     }[law]
     V = rng.normal(size=(k * dim, 2))

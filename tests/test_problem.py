@@ -4,6 +4,7 @@ from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
 from contactopt.problem import balance_residual, dimensionless, fit_multipliers
+from contactopt.problem.laws.bilateral import Bilateral
 
 
 @pytest.mark.parametrize("reaction", [(1.0, 0.8), (0.4, 0.4), (0.0, 0.0)])
@@ -70,10 +71,10 @@ def test_rounding_in_an_open_contact_is_no_error(noise):
 
 
 def test_bilateral_contact_carries_tension_and_its_friction():
-    problem = InterfaceProblem(np.eye(2), [[2.0, 0.5]], 0.3, bilateral=True)  # r_n = -2 keeps u_n = 0
+    problem = InterfaceProblem(np.eye(2), [[2.0, 0.5]], Bilateral(0.3))  # r_n = -2 keeps u_n = 0
     assert natural_map_residual(problem, [[-2.0, -0.5]]) < 1e-15
     assert natural_map_residual(problem, [[0.0, 0.0]]) > 0.1
-    slipping = InterfaceProblem(np.eye(2), [[2.0, 0.9]], 0.3, bilateral=True)
+    slipping = InterfaceProblem(np.eye(2), [[2.0, 0.9]], Bilateral(0.3))
     assert natural_map_residual(slipping, [[-2.0, -0.6]]) < 1e-15
 
 
@@ -103,8 +104,8 @@ def test_reactions_that_are_not_finite(punch):
 @pytest.mark.parametrize(
     "change,message",
     [
-        (dict(mu=[-0.1]), "must not be negative"),
-        (dict(mu=[np.nan]), "not finite"),
+        (dict(law=[-0.1]), "must not be negative"),
+        (dict(law=[np.nan]), "not finite"),
         (dict(Q=np.eye(3)), "Q must have shape"),
         (dict(Q=np.array([[1.0, 0.5], [0.0, 1.0]])), "symmetric"),
         (dict(q=np.zeros((1, 4))), "2 or 3 columns"),
@@ -112,7 +113,7 @@ def test_reactions_that_are_not_finite(punch):
     ],
 )
 def test_bad_problems_are_refused(change, message):
-    good = dict(Q=np.eye(2), q=np.zeros((1, 2)), mu=[0.5])
+    good = dict(Q=np.eye(2), q=np.zeros((1, 2)), law=[0.5])
     with pytest.raises(InputError, match=message):
         InterfaceProblem(**(good | change))
 

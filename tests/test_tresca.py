@@ -7,6 +7,8 @@ from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, Material, Part, Rigid, Scene, Support, fclib, reduce, scenes, solve
 from contactopt.problem import dimensionless
+from contactopt.problem.laws.bilateral import Bilateral
+from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.scenes.meshes import rename, tensor_mesh
 from contactopt.solving.methods.tresca import Tresca, TrescaProblem
 
@@ -47,12 +49,12 @@ def dragged() -> InterfaceProblem:
 @pytest.mark.parametrize("mu,iterations", [(0.2, 9), (0.5, 13), (1.0, 20), (1.5, 30), (2.0, 47)])
 def test_more_friction_needs_more_iterations(dragged, mu, iterations):
     """Numbers of an independent prototype on a block of these proportions, to 1e-8."""
-    solution = solve(replace(dragged, mu=np.full(dragged.contacts, mu)), Tresca(), tol=1e-8)
+    solution = solve(replace(dragged, law=mu), Tresca(), tol=1e-8)
     assert solution.solved and abs(solution.iterations - iterations) <= 2
 
 
 def test_too_much_friction_for_a_fixed_point_is_none_for_newton(dragged):
-    problem = replace(dragged, mu=np.full(dragged.contacts, 3.0))
+    problem = replace(dragged, law=3.0)
     assert solve(problem, Tresca(), max_iterations=200).status.label == "iteration_limit"
     assert solve(problem, Tresca(relaxation=0.5), max_iterations=200).solved
     assert solve(problem, "newton").solved
@@ -99,7 +101,8 @@ def test_other_backends_give_the_same(dim, backend):
 @pytest.mark.parametrize("bilateral", [False, True])
 def test_the_convex_problem_is_solved_to_rounding(cube, bilateral):
     """Every iterate obeys both laws for its own bounds, some of them zero, not only the last one for Coulomb's."""
-    problem = replace(dimensionless(cube)[0], bilateral=bilateral)
+    problem, _ = dimensionless(cube)
+    problem = replace(problem, law=(Bilateral if bilateral else Coulomb)(problem.mu))
     g = np.where(np.arange(cube.contacts) % 3 == 0, 0.0, 0.05)
     r, lam = TrescaProblem("clarabel", problem).solve(g, np.zeros(problem.q.shape))
     u = problem.displacements(r, lam)

@@ -260,7 +260,7 @@ def _local(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray, largest: f
     k, dim = r.shape
     bound, force = problem.mu * np.abs(r[:, 0]), np.linalg.norm(r[:, 1:], axis=1)
     size = np.abs(r[:, 0]).max(initial=0.0)
-    closed = np.full(k, True) if problem.bilateral else r[:, 0] > 1e-8 * size
+    closed = (problem.law.lowest < 0) | (r[:, 0] > 1e-8 * size)
     stick = closed & (force < (1 - 1e-6) * bound)
     slip = closed & ~stick & (bound > 1e-8 * size)
     counts = int(stick.sum()), int(slip.sum()), int((~closed).sum())
@@ -299,7 +299,7 @@ def _local(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray, largest: f
 
 
 def _relaxation(problem: InterfaceProblem) -> str:
-    if problem.bilateral:
+    if not Relaxation().solves(problem.law):
         return "none"
     answer = solve(problem, Relaxation(), tol=CERTIFIED)
     if answer.solved:

@@ -34,12 +34,14 @@ OPEN, STICK, FORWARD, BACKWARD = range(4)
 def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]:
     """Every solution of a 2D Coulomb problem, at most `limit` of them, each certified; [] if there is none.
 
-    Raises InputError in 3D, for bilateral contact, for more than 24 contacts, for Q that is not positive definite on the
+    Raises InputError in 3D, for other laws, for more than 24 contacts, for Q that is not positive definite on the
     balanced forces and for plates that do not press; BackendError if HiGHS fails.
     """
     check_number("limit", limit, low=0.0)
-    if problem.dim != 2 or problem.bilateral or problem.contacts > LARGEST:
-        raise InputError(f"all_solutions needs a 2D unilateral problem of at most {LARGEST} contacts; use solve.")
+    if problem.dim != 2 or not _coulomb(problem) or problem.contacts > LARGEST:
+        raise InputError(
+            f"all_solutions needs a 2D problem of Coulomb's law with at most {LARGEST} contacts; use solve."
+        )
     scaled, scales = dimensionless(problem)
     program, found = _Program(scaled), list[Solution]()
     while len(found) < limit:
@@ -55,6 +57,11 @@ def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]
             found.append(Solution(reactions, multipliers, Status.SOLVED, residual, program.searches, "all_solutions"))
         program.exclude(possible)
     return found
+
+
+def _coulomb(problem: InterfaceProblem) -> bool:
+    law = problem.law
+    return law.unilateral and law.proportional and not law.dilatant
 
 
 class _Program:

@@ -15,6 +15,7 @@ import scipy.linalg as la
 from contactopt.benchmark.plugins import plugin_problems
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
+from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.scenes import SCENES, make_scene
 from contactopt.scenes.scene import Part, Scene
 
@@ -112,7 +113,7 @@ def rigid_bodies(bodies: int = 10, contacts: int = 30, mu: float = 0.5, seed: in
             H[3 * c : 3 * c + 3, 6 * body : 6 * body + 6] = sign * np.hstack([frame, np.cross(arm, frame)])
     inverse_mass = 10 ** rng.uniform(-1, 1, 6 * bodies)
     return InterfaceProblem(
-        (H * inverse_mass) @ H.T, (H @ rng.normal(size=6 * bodies)).reshape(-1, 3), np.full(contacts, mu)
+        (H * inverse_mass) @ H.T, (H @ rng.normal(size=6 * bodies)).reshape(-1, 3), Coulomb(np.full(contacts, mu))
     )
 
 
@@ -140,7 +141,7 @@ def half_plane(contacts: int = 64, mu: float = 0.5, coupling: float = 0.0) -> In
     return InterfaceProblem(
         Q.reshape(2 * contacts, -1),
         q,
-        np.full(contacts, mu),
+        Coulomb(np.full(contacts, mu)),
         V.reshape(-1, 1),
         np.array([-0.25]),
         np.full(contacts, h),
@@ -174,7 +175,7 @@ def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) 
     drag[:, 1] = shear * mu * p
     q[:, 1:] -= (Q @ drag.ravel()).reshape(k, dim)[:, 1:]
     q[:, 0] = -compliance * p
-    return InterfaceProblem(Q, q, np.full(k, mu), areas=coupled.areas, coordinates=coupled.coordinates)
+    return InterfaceProblem(Q, q, Coulomb(np.full(k, mu)), areas=coupled.areas, coordinates=coupled.coordinates)
 
 
 def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
@@ -184,12 +185,11 @@ def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
     return InterfaceProblem(
         p.Q[np.ix_(index, index)],
         np.repeat(p.q, copies, axis=0),
-        np.repeat(p.mu, copies),
+        p.law.select(np.repeat(np.arange(p.contacts), copies)),
         p.V[index],
         p.s,
         np.repeat(p.areas, copies) / copies,
         np.repeat(p.coordinates, copies, axis=1),
-        p.bilateral,
     )
 
 

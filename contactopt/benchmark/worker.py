@@ -24,6 +24,7 @@ from contactopt.benchmark.plugins import load_plugins
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.solving.driver import solve
 
 KEPT = 3  # problems in memory
@@ -90,7 +91,7 @@ class Runner:
         if spec.label not in self.starts:
             self.note("build")
             q, s = (problem.q, NEIGHBOUR * problem.s) if len(problem.s) else (NEIGHBOUR * problem.q, problem.s)
-            solution = solve(replace(problem, mu=NEIGHBOUR * problem.mu, q=q, s=s))
+            solution = solve(replace(problem, law=problem.law.times(NEIGHBOUR), q=q, s=s))
             if not solution.solved:
                 raise InputError(f"no warm start: {solution.message}")
             self.starts[spec.label] = solution
@@ -106,7 +107,7 @@ class Runner:
         q = np.zeros((2, dim))
         q[:, 0], q[:, 1] = -1.0, 0.5
         with suppress(Exception):  # the run itself will tell
-            call(task, InterfaceProblem(Q, q, np.full(2, 0.5)), None)
+            call(task, InterfaceProblem(Q, q, Coulomb(np.full(2, 0.5))), None)
         self.warm.add(mark)
         self.note("solve")
 

@@ -30,6 +30,7 @@ from contactopt.errors import InputError
 from contactopt.interface.condensation import ReducedBody, loaded_body, reduce_body
 from contactopt.interface.matching import match_bodies, positions
 from contactopt.problem import InterfaceProblem
+from contactopt.problem.laws import make_law
 from contactopt.problem.operators import FORMS, InterfaceOperator, estimate_diagonal, nodal_weights
 from contactopt.scenes.scene import Part, Scene
 
@@ -93,7 +94,8 @@ class Reduction:
         ]
         maps = _maps(self.bodies, self.nodes, self.frames)
         q, V, s, plates = _linear_terms(scene, bodies, maps, self.frames, self.gap)
-        problem = replace(self.problem, q=q, V=V, s=s, mu=np.full(len(q), float(scene.mu)), bilateral=scene.bilateral)
+        law = make_law(scene.law, scene.mu, self.problem.areas, self.problem.coordinates)
+        problem = replace(self.problem, q=q, V=V, s=s, law=law)
         seconds = {"load": time.perf_counter() - start}
         return replace(
             self, scene=scene, problem=problem, bodies=(bodies[0], bodies[1]), plates=plates, seconds=seconds
@@ -147,12 +149,11 @@ def reduce_bodies(
     problem = InterfaceProblem(
         operator if Q == "implicit" else operator.to_dense(),
         q,
-        np.full(len(gap), float(scene.mu)),
+        make_law(scene.law, scene.mu, areas, points),
         V,
         s,
         areas,
         points,
-        scene.bilateral,
     )
     seconds["compliance"] = time.perf_counter() - start
     return Reduction(scene, problem, reduced, nodes, frames, gap, plates, seconds)

@@ -6,12 +6,15 @@ Nothing here, or below in what it imports, knows finite elements.
 from contactopt.problem.certificate import balance_residual, fit_multipliers, natural_map_residual
 from contactopt.problem.chart import Chart
 from contactopt.problem.interface_problem import InterfaceProblem
+from contactopt.problem.laws import LAWS, Law
 from contactopt.problem.scaling import Scales, dimensionless
 from contactopt.problem.solution import Solution, Status
 
 __all__ = [
+    "LAWS",
     "Chart",
     "InterfaceProblem",
+    "Law",
     "Scales",
     "Solution",
     "Status",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.problem.cones import friction_cone, split
+from contactopt.problem.cones import split
 from contactopt.problem.interface_problem import InterfaceProblem
 
 
@@ -15,9 +15,10 @@ def natural_map_residual(
 ) -> float:
     """How far reactions are from a solution, dimensionless: the certificate of every answer.
 
-    With K the product of the friction cones and w = q + V lambda,
-        |r - proj_K(r - rho (u + mu |u_t| n))| / max(|r|, rho |w|, rho |u|),
-    which is zero exactly at the solutions; for bilateral contact K allows tension and the bound is mu |r_n|.
+    With K the product of the law's sets of forces, g its opening (Coulomb: the friction cones and mu |u_t|) and
+    w = q + V lambda,
+        |r - proj_K(r - rho (u + g n))| / max(|r|, rho |w|, rho |u|),
+    which is zero exactly at the solutions (contactopt.problem.laws).
     rho = 1 without a plate is the measure of Siconos and FCLib, which depends on units. By default rho [force/length]
     makes |r| and the smaller of rho |w|, rho |Q r| comparable, so that no choice of units can hide an error: the
     result is the same in all units. A relative error of the balance V' r + s = 0 counts as well: the larger is given.
@@ -46,7 +47,7 @@ def natural_map_residual(
     size = max(np.linalg.norm(r), rho * np.linalg.norm(w), rho * np.linalg.norm(u))
     gap = 0.0
     if size != 0:
-        gap = float(np.linalg.norm(r - friction_cone(r, u, rho, problem.mu, problem.bilateral)) / size)
+        gap = float(np.linalg.norm(r - problem.law.natural_map(r, u, rho)) / size)
     worst = np.max([gap, balance_residual(problem, r)])
     return float(worst) if np.isfinite(worst) else np.inf
 
@@ -73,14 +74,14 @@ def balance_residual(problem: InterfaceProblem, reactions: np.ndarray) -> float:
 def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray:
     """The lambda that fits the reactions best: least squares on the components whose displacement must vanish.
 
-    Those are u_n where r_n > 0 and u_t where |r_t| < mu r_n. With none, zeros.
+    Those are u_n where r_n > 0 and u_t where |r_t| is below the friction bound. With none, zeros.
     """
     if len(problem.s) == 0:
         return np.zeros(0)
     r_n, r_t = split(reactions)
     size = np.abs(r_n).max(initial=0.0)
     pressed = np.abs(r_n) > 1e-8 * size
-    stuck = pressed & (np.linalg.norm(r_t, axis=1) < (1 - 1e-6) * problem.mu * np.abs(r_n))
+    stuck = pressed & (np.linalg.norm(r_t, axis=1) < (1 - 1e-6) * problem.law.bound(r_n))
     rows = np.concatenate([pressed[:, None], np.repeat(stuck[:, None], problem.dim - 1, axis=1)], axis=1).ravel()
     if not rows.any():
         return np.zeros(len(problem.s))

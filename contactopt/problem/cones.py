@@ -1,4 +1,7 @@
-"""Projections of contact mechanics: half-line, interval or disc, Coulomb's cone; vectorised over the contacts."""
+"""Projections of contact mechanics: half-line, interval or disc, Coulomb's cone; vectorised over the contacts.
+
+This is geometry alone. Which of them a contact obeys is the business of contactopt.problem.laws.
+"""
 
 from __future__ import annotations
 
@@ -30,28 +33,10 @@ def coulomb_cone(r: np.ndarray, mu: np.ndarray) -> np.ndarray:
     return out
 
 
-def friction_cone(r: np.ndarray, u: np.ndarray, rho: float, mu: np.ndarray, bilateral: bool) -> np.ndarray:
-    """proj_K(r - rho (u + mu |u_t| n)), the natural map of Coulomb friction (De Saxce's form).
-
-    Bilateral contact: the normal part is r_n - rho u_n, the tangential part is projected on the disc mu |r_n|.
-    """
-    if bilateral:
-        shifted = r - rho * u
-        shifted[:, 1:] = disc(shifted[:, 1:], mu * np.abs(r[:, 0]))
-        return shifted
-    shifted = r - rho * u
-    shifted[:, 0] -= rho * mu * np.linalg.norm(u[:, 1:], axis=1)
-    return coulomb_cone(shifted, mu)
-
-
-def half_line_derivative(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of y (k, 1) on [0, inf) and its generalised derivative (k, 1, 1)."""
-    return np.maximum(y, 0.0), (y > 0).astype(float)[:, :, None]
-
-
-def whole_line_derivative(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """No constraint: y (k, 1) itself and its derivative (k, 1, 1)."""
-    return y, np.ones((len(y), 1, 1))
+def half_line_derivative(y: np.ndarray, low: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Projection of y (k, 1) on [low, inf) and its generalised derivative (k, 1, 1); low may be -inf, one or (k,)."""
+    bound = np.broadcast_to(low, len(y))[:, None]
+    return np.maximum(y, bound), (y > bound).astype(float)[:, :, None]
 
 
 def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -72,23 +57,31 @@ def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.n
     return disc(y, radius), D
 
 
-def coulomb_map(y: np.ndarray, mu: np.ndarray, bilateral: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """The Alart-Curnier map of y = r - rho u (k, dim) and its generalised derivative (k, dim, dim).
+def cylinder_derivative(
+    y: np.ndarray, radius: np.ndarray, low: np.ndarray | float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Projection of y (k, dim) on r_n >= low, |r_t| <= radius (k,), and its generalised derivative (k, dim, dim)."""
+    P, D = np.empty_like(y), np.zeros((*y.shape, y.shape[1]))
+    P[:, :1], D[:, :1, :1] = half_line_derivative(y[:, :1], low)
+    P[:, 1:], D[:, 1:, 1:] = disc_derivative(y[:, 1:], radius)
+    return P, D
 
-    Normal part max(y_n, 0), tangential part projected on the disc of radius mu max(y_n, 0); bilateral contact: y_n and
-    mu |y_n|. Not a projection on a convex set, but r = P(r - rho u) exactly at the solutions of Coulomb's problem.
+
+def disc_of_height(
+    height: np.ndarray, t: np.ndarray, mu: np.ndarray, slope: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The heights beside t (k, dim - 1) projected on discs of radius mu |height|, and the derivative (k, dim, dim).
+
+    slope  (k,) derivative of |height| by the height, so that the radii grow by mu slope
     """
-    k, dim = y.shape
-    n, t = split(y)
-    normal, sign = (n, np.sign(n)) if bilateral else (np.maximum(n, 0.0), (n > 0).astype(float))
-    bound, slope = mu * np.abs(normal), mu * sign
+    k, dim = len(t), t.shape[1] + 1
+    bound, grow = mu * np.abs(height), mu * slope
     length = np.linalg.norm(t, axis=1)
-    slip = (length > bound) & (bilateral | (n > 0))
-    P = np.concatenate([normal[:, None], disc(t, bound)], axis=1)
-    D = np.zeros((k, dim, dim))
-    D[bilateral | (n > 0)] = np.eye(dim)
+    slip = length > bound
+    P = np.concatenate([height[:, None], disc(t, bound)], axis=1)
+    D = np.broadcast_to(np.eye(dim), (k, dim, dim)).copy()
     unit = t[slip] / length[slip, None]
-    D[slip, 1:, 0] = slope[slip, None] * unit
+    D[slip, 1:, 0] = grow[slip, None] * unit
     turn = (bound[slip] / length[slip])[:, None, None]
     D[slip, 1:, 1:] = turn * (np.eye(dim - 1) - unit[:, :, None] * unit[:, None, :])
     if dim == 2:

@@ -1,8 +1,9 @@
-"""The interface problem of frictional contact, its solution and its certificate. Knows nothing of finite elements.
+"""The interface problem of frictional contact. Knows nothing of finite elements.
 
     u = Q r + V lambda + q,      V' r + s = 0,                                     (paper, eq (14))
-    u_n >= 0,  r_n >= 0,  u_n r_n = 0,        (Signorini; bilateral contact instead: u_n = 0)      (15)
-    |r_t| <= mu |r_n|,  and where u_t != 0:  r_t = -mu |r_n| u_t / |u_t|.             (Coulomb)   (16)-(17)
+    and at every contact a law, by default Coulomb's (contactopt.problem.laws has others):
+    u_n >= 0,  r_n >= 0,  u_n r_n = 0,                                                (Signorini)  (15)
+    |r_t| <= mu r_n,  and where u_t != 0:  r_t = -mu r_n u_t / |u_t|.                 (Coulomb)   (16)-(17)
 
 One block per contact node, normal component first. r is the force on the upper body, r_n >= 0 in compression;
 u is the relative displacement plus the initial gap, so that u_n is the gap that remains. In the paper's letters
@@ -13,77 +14,82 @@ lambda is the plate's displacement, s collects minus what r must balance.
 from __future__ import annotations
 
 import hashlib
+import logging
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
+from contactopt.problem.laws import Law
+from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.operators import Interface, InterfaceOperator
+
+logger = logging.getLogger(__name__)
+
+LARGEST = 8e9  # bytes of a Q that is formed in full from its products
 
 
 @dataclass(frozen=True, eq=False)
 class InterfaceProblem:
-    """Coulomb contact at k nodes in `dim` dimensions, as in the head of this module.
+    """Contact at k nodes in `dim` dimensions, as in the head of this module.
 
     Q            (k dim, k dim) compliance, symmetric positive semidefinite [length / force]: an array, or an
                  InterfaceOperator that knows it by its products only
     q            (k, dim) displacement at r = 0, lambda = 0 [length]; q_n holds the initial gap
-    mu           (k,) friction coefficients
+    law          a Law of contactopt.problem.laws, or friction coefficients mu, one number or (k,), which mean Coulomb's law
     V, s         (k dim, p) rigid motions and (p,) resultants [force]; p = 0 without a plate
     areas        (k,) nodal areas, force / area = traction; ones by default
     coordinates  (d, k) positions of the nodes in space, for output only; 0, 1, 2, ... by default
     chart        the nodes' places on the contact surface; by default read from the coordinates (Chart.of_points)
-    bilateral    no separation: u_n = 0, friction bound mu |r_n|
-    Raises InputError on wrong shapes, numbers that are not finite, negative mu, an unsymmetric Q or one with a negative
+    Raises InputError on wrong shapes, numbers that are not finite or not real, negative mu, V without s, an unsymmetric Q or one with a negative
     diagonal (an indefinite Q is not looked for: its answers are certified like any other; an operator is taken at its
     word).
     """
 
     Q: Interface
     q: np.ndarray
-    mu: np.ndarray
+    law: Law
     V: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     s: np.ndarray = field(default_factory=lambda: np.zeros(0))
     areas: np.ndarray = field(default_factory=lambda: np.zeros(0))
     coordinates: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    bilateral: bool = False
     chart: Chart = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        q = np.atleast_2d(np.asarray(self.q, dtype=float))
-        k, dim = q.shape
+        q = np.atleast_2d(real_array("q", self.q))
+        k, dim = q.shape if q.ndim == 2 else (len(q), 0)
         if dim not in (2, 3):
             raise InputError(f"q must have 2 or 3 columns (normal first), one row per contact; got shape {q.shape}.")
+        if np.size(self.V) and not np.size(self.s):
+            raise InputError("V has columns but s is empty; give the resultant s of every column of V.")
+        law = self.law if isinstance(self.law, Law) else Coulomb(self.law)
+        object.__setattr__(self, "law", law.spread(k))
         places = np.atleast_2d(self.coordinates if np.size(self.coordinates) else np.arange(k))
         implicit = isinstance(self.Q, InterfaceOperator)
         arrays: dict[str, tuple[Any, tuple[int, ...]]] = {
             "Q": (self.Q, (k * dim, k * dim)),
             "q": (q, (k, dim)),
-            "mu": (np.broadcast_to(self.mu, (k,)) if np.ndim(self.mu) == 0 else self.mu, (k,)),
             "s": (self.s, (np.size(self.s),)),
             "V": (self.V if np.size(self.s) else np.zeros((k * dim, 0)), (k * dim, np.size(self.s))),
             "areas": (self.areas if np.size(self.areas) else np.ones(k), (k,)),
             "coordinates": (places, (len(places), k)),
         }
         for name, (value, shape) in arrays.items():
-            array = self.Q if name == "Q" and implicit else np.array(value, dtype=float)
+            array = self.Q if name == "Q" and implicit else real_array(name, value)
             if array.shape != shape:
                 raise InputError(f"{name} must have shape {shape}; got {array.shape}.")
             if array is self.Q:
                 continue
-            if not np.all(np.isfinite(array)):
-                raise InputError(f"{name} holds a number that is not finite.")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         if self.chart is None:
             object.__setattr__(self, "chart", Chart.of_points(self.coordinates, dim))
         elif self.chart.places.shape != (dim - 1, k):
             raise InputError(f"the chart must have places of shape {(dim - 1, k)}; got {self.chart.places.shape}.")
-        if np.any(self.mu < 0):
-            raise InputError(f"the friction coefficient mu must not be negative; its least value is {self.mu.min():g}.")
         if isinstance(self.Q, InterfaceOperator):
             return
         if np.abs(self.Q - self.Q.T).max(initial=0.0) > 1e-2 * np.abs(self.Q).max(initial=0.0):
@@ -99,19 +105,33 @@ class InterfaceProblem:
     def dim(self) -> int:
         return int(self.q.shape[1])
 
+    @property
+    def mu(self) -> np.ndarray:
+        """(k,) friction coefficients of the law, 0 where it has none."""
+        return self.law.coefficient
+
     @cached_property
     def fingerprint(self) -> str:
         """Digest of the problem's data, for caching and for naming it in tables."""
-        digest = hashlib.sha256(bytes([self.bilateral]))
+        digest = hashlib.sha256(self.law.digest)
         implicit = isinstance(self.Q, InterfaceOperator)
         probe = self.Q @ np.random.default_rng(0).normal(size=self.q.size) if implicit else self.Q
-        for array in (probe, self.q, self.mu, self.V, self.s):
+        for array in (probe, self.q, self.V, self.s):
             digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()[:16]
 
     def explicit(self) -> InterfaceProblem:
-        """The same problem with Q an array."""
-        return replace(self, Q=self.Q.to_dense()) if isinstance(self.Q, InterfaceOperator) else self
+        """The same problem with Q an array; InputError if that is larger than LARGEST bytes."""
+        if not isinstance(self.Q, InterfaceOperator):
+            return self
+        size = 8 * self.q.size**2
+        if size > LARGEST:
+            raise InputError(
+                f"Q in full would take {size / 1e9:.1f} GB, more than the {LARGEST / 1e9:g} GB that are allowed; "
+                "use the method 'newton', or 'alternating' with the backend 'pcg', which need products with Q only."
+            )
+        logger.info("forming Q in full: %d unknowns, %.3g MB", self.q.size, size / 1e6)
+        return replace(self, Q=self.Q.to_dense())
 
     def displacements(self, reactions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """u = Q r + V lambda + q, (k, dim) [length]."""

@@ -58,5 +58,6 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
         q=problem.q / length,
         V=problem.V / columns,
         s=problem.s / (columns * force),
+        law=problem.law.scaled(force),
     )
     return scaled, Scales(force, length, length / columns)

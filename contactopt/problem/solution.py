@@ -37,7 +37,9 @@ class Solution:
     residual     the certificate: natural_map_residual(problem, reactions, multipliers)
     history      one mapping per outer iteration: residual, change (of the tangential force), seconds and, where Q is an
                  operator, products, the method's products with Q so far
-    seconds      phase -> time
+    seconds      phase -> seconds of wall time. "solve": of the method; "certificate": of judging its iterates. Who adds a
+                 phase of their own names it: recovery, the coarse meshes before this one, the phases of a reduction
+    notes        sentences about what the solve did otherwise than expected: a fallback, a stage that failed
     """
 
     reactions: np.ndarray
@@ -49,6 +51,7 @@ class Solution:
     history: tuple[dict[str, float], ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
     message: str = ""
+    notes: tuple[str, ...] = ()
 
     @property
     def products(self) -> int:

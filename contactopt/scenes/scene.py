@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.checks import check_number
+from contactopt.checks import check_number, real_array
 from contactopt.errors import InputError
 from contactopt.material import Material
+from contactopt.problem.laws import find_law
 
 # The components of a displacement, in the order of the mesh coordinates.
 COMPONENTS = {"plane-strain": ("x", "y"), "axisymmetric": ("r", "z"), "solid": ("x", "y", "z")}
@@ -110,14 +111,16 @@ class Scene:
 
     The contact normal is the outward normal of `lower`; a positive normal reaction pushes `upper` away from it.
 
-    mu         Coulomb friction coefficient, mu >= 0.
+    mu         what the law reads: the friction coefficient, for 'tresca' a bound of the tangential traction [stress]; a
+               number >= 0, one per contact node (k,), or a function of the nodes' positions (dim, k) that gives either.
     kind       'plane-strain', 'axisymmetric' (coordinates r, z) or 'solid'.
     thickness  depth of a plane-strain body [length].
     copies     how many mirror images make the whole body: 2 for a half model, 4 for a quarter. Forces, nodal
                forces and nodal areas are those of all the images together, as on the ring of an axisymmetric body.
     degree     of the displacement in every element: 1, linear, or 2, quadratic; 2 for nearly incompressible bodies,
                where linear elements lock.
-    bilateral  no separation: the normal displacement always equals the initial gap, the friction bound is mu |r_n|.
+    law        a name in contactopt.problem.laws.LAWS: 'coulomb'; 'bilateral', contact that cannot open; 'tresca', 'associated' or
+               'frictionless'.
     elements   default number of elements across the contact half-width, for parts whose mesh is a function.
     zone       first guess of the contact half-width [length]; None when the geometry fixes the contact zone.
     units      names of the units of length and stress, for the axes of figures
@@ -127,12 +130,12 @@ class Scene:
     name: str
     upper: Part | Rigid
     lower: Part | Rigid
-    mu: float
+    mu: float | np.ndarray | Callable[[np.ndarray], Any]
     kind: str = "plane-strain"
     thickness: float = 1.0
     copies: int = 1
     degree: int = 1
-    bilateral: bool = False
+    law: str = "coulomb"
     elements: int = 16
     zone: float | None = None
     units: tuple[str, str] = ("length", "stress")
@@ -141,7 +144,9 @@ class Scene:
     def __post_init__(self) -> None:
         if self.kind not in COMPONENTS:
             raise InputError(f"scene '{self.name}': unknown kind {self.kind!r}; choose from {', '.join(COMPONENTS)}.")
-        check_number("the friction coefficient mu", self.mu, low=0.0, closed=True)
+        find_law(self.law)
+        if not callable(self.mu):
+            _check_friction(self.mu)
         check_number("the thickness", self.thickness, low=0.0)
         if self.zone is not None:
             check_number("the contact zone's half-width", self.zone, low=0.0)
@@ -156,6 +161,12 @@ class Scene:
             raise InputError(f"scene '{self.name}': both bodies are rigid; at least one must be elastic.")
         for part in (self.upper, self.lower):
             self._check_part(part)
+
+    @property
+    def friction(self) -> str:
+        """The law and its number, for titles: 'mu = 0.3'."""
+        name = "mu" if self.law in ("coulomb", "bilateral") else f"{self.law}, mu"
+        return f"{name} = {self.mu:g}" if isinstance(self.mu, (int, float)) else f"{name} varies"
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -200,3 +211,12 @@ class Scene:
                     f"body '{body}': there is no component {component!r}; use {', '.join(self.components)}."
                 )
             check_number(f"the {component} value of body '{body}'", value)
+
+
+def _check_friction(mu: Any) -> None:
+    """Raise InputError unless mu is a number, or an array of numbers, that are not negative."""
+    name = "the friction coefficient mu"
+    if np.ndim(mu) == 0:
+        check_number(name, mu, low=0.0, closed=True)
+    elif np.any(real_array(name, mu) < 0):
+        raise InputError(f"{name} must not be negative; its least value is {np.min(mu):g}.")

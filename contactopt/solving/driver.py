@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +13,8 @@ from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
 from contactopt.problem import InterfaceProblem, Scales, Solution, Status, dimensionless, natural_map_residual
 from contactopt.problem.operators import InterfaceOperator, loosened
-from contactopt.solving.methods import Method, default_method, find_method
+from contactopt.solving.methods import Method, default_method, find_method, solvers_of, solves
+from contactopt.solving.notes import collected
 
 CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
@@ -43,20 +44,52 @@ def solve(
                     it is met first the iteration ends, with status `settled` unless the certificate agrees
     start           a solution of a problem of the same size, to start from instead of cold
     progress        called with (iteration, residual) after each outer iteration
-    Raises InputError on arguments that make no sense, an unknown or missing backend, or a load that pulls the bodies
-    apart. A backend that fails while solving is a status, with the last iterate.
+    Raises InputError on arguments that make no sense, an unknown or missing backend, a method that does not solve the
+    problem's law, or a load that pulls the bodies apart. A backend that fails while solving is a status, with the last iterate.
     """
     check_number("tol", tol, low=0.0)
     check_number("max_iterations", max_iterations, low=0.0)
     if change_tol is not None:
         check_number("change_tol", change_tol, low=0.0)
+    if not isinstance(time_limit, (int, float, np.number)) or not time_limit >= 0:
+        raise InputError(f"time_limit must be a number of seconds, at least 0; got {time_limit!r}.")
+    chosen = _method_for(problem, method, settings)
+    with collected() as notes:
+        solution = _run(problem, chosen, tol, max_iterations, time_limit, change_tol, start, progress)
+    return replace(solution, notes=tuple(notes))
+
+
+def _method_for(problem: InterfaceProblem, method: str | Method | None, settings: Mapping[str, Any]) -> Method:
+    """The method object; InputError if it is none, or does not solve the problem's law."""
     if method is None or isinstance(method, str):
         method = find_method(method or default_method(settings), **settings)
+    elif not callable(getattr(method, "iterate", None)):
+        raise InputError(f"method must be a name or an object with a function `iterate`; got {method!r}.")
     elif settings:
         raise InputError(
             f"settings {', '.join(settings)} belong to a method given by name; set them on the method object."
         )
+    if not solves(method, problem.law):
+        raise InputError(
+            f"the method {method!r} does not solve the law {type(problem.law).__name__}; "
+            f"these do: {', '.join(solvers_of(problem.law))}."
+        )
+    return method
+
+
+def _run(
+    problem: InterfaceProblem,
+    method: Method,
+    tol: float,
+    max_iterations: int,
+    time_limit: float,
+    change_tol: float | None,
+    start: Solution | None,
+    progress: Callable[[int, float], None] | None,
+) -> Solution:
     _check_equilibrium(problem)
+    if problem.contacts == 0:
+        return _without_contacts(problem, method, tol)
     if not getattr(method, "implicit", False):
         problem = problem.explicit()
     scaled, scales = dimensionless(problem)
@@ -71,6 +104,9 @@ def solve(
                 iterate = next(steps, None)
         except BackendError as error:
             message, status = str(error), Status.BACKEND_FAILED
+            break
+        except np.linalg.LinAlgError as error:
+            message, status = f"the method broke down in its linear algebra: {error}", Status.BACKEND_FAILED
             break
         if iterate is None:
             break
@@ -92,22 +128,38 @@ def solve(
         len(recorder.history),
         repr(method),
         tuple(recorder.history),
-        {"solve": recorder.clock},
+        {"solve": recorder.clock, "certificate": recorder.certified},
         message or status.sentence,
     )
 
 
+def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> Solution:
+    """No contact: no force. It solves the problem unless a plate needs forces that balance its load."""
+    r, multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
+    residual = natural_map_residual(problem, r, multipliers)
+    status = Status.SOLVED if residual <= tol else Status.SETTLED
+    message = status.sentence if residual <= tol else "there is no contact that could balance the load on the plate"
+    return Solution(r, multipliers, status, residual, 0, repr(method), message=message)
+
+
 def _dimensionless_start(start: Solution, problem: InterfaceProblem, scales: Scales) -> tuple[np.ndarray, np.ndarray]:
+    if not isinstance(start, Solution):
+        raise InputError(f"start must be a Solution; got {type(start).__name__}.")
     if start.reactions.shape != problem.q.shape or start.multipliers.shape != problem.s.shape:
         raise InputError(
             f"start has reactions {start.reactions.shape} and {len(start.multipliers)} multipliers; this problem needs "
             f"{problem.q.shape} and {len(problem.s)}."
         )
+    if not (np.all(np.isfinite(start.reactions)) and np.all(np.isfinite(start.multipliers))):
+        raise InputError("start holds a number that is not finite.")
     return scales.to_dimensionless(start.reactions, start.multipliers)
 
 
 class _Recorder:
-    """Certificate, history and stopping rule of one solve; its clock counts the method's own time."""
+    """Certificate, history and stopping rule of one solve.
+
+    clock counts the method's own seconds, certified those of the certificate.
+    """
 
     def __init__(self, problem, scales, tol, change_tol, max_iterations, time_limit, progress):  # type: ignore[no-untyped-def]
         self.problem, self.scales, self.tol, self.change_tol = problem, scales, tol, change_tol
@@ -116,7 +168,7 @@ class _Recorder:
         self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
         self.history: list[dict[str, float]] = []
         self.recent: list[np.ndarray] = [self.reactions]
-        self.clock = 0.0
+        self.clock, self.certified = 0.0, 0.0
         self.repeated = 0
 
     def _certificate(self) -> float:
@@ -132,7 +184,9 @@ class _Recorder:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
         self.clock += seconds
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)
+        begin = time.perf_counter()
         self.residual = self._certificate()
+        self.certified += time.perf_counter() - begin
         change = _relative(self.reactions[:, 1:], self.recent[-1][:, 1:])
         repeats = [m for m, old in enumerate(reversed(self.recent), 1) if _relative(self.reactions, old) < SAME]
         self.recent = [*self.recent[1 - CYCLE :], self.reactions]
@@ -158,7 +212,7 @@ def _relative(new: np.ndarray, old: np.ndarray) -> float:
 
 def _check_equilibrium(problem: InterfaceProblem) -> None:
     """Contact only pushes: a plate that moves along the normals must be pressed on, not pulled off."""
-    if problem.bilateral:
+    if not problem.law.unilateral:
         return
     V = problem.V.reshape(problem.contacts, problem.dim, -1)
     for column, s in zip(np.moveaxis(V, 2, 0), problem.s):

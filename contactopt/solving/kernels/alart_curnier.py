@@ -1,6 +1,6 @@
-"""Alart and Curnier's equations of Coulomb friction, their Newton steps, dense or by Krylov methods, and where to start.
+"""Alart and Curnier's equations of contact and friction, their Newton steps, dense or by Krylov methods, and where to start.
 
-r = P(r - rho (Q r + V lambda + q)),  V' r + s = 0,  P the Coulomb map (contactopt.problem.cones.coulomb_map)
+r = P(r - rho (Q r + V lambda + q)),  V' r + s = 0,  P the map of the law (contactopt.problem.laws, `project`)
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import numpy as np
 import scipy.linalg as la
 
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.cones import coulomb_map
 from contactopt.problem.operators import diagonal
 from contactopt.solving.kernels.bonded import Bonded
 from contactopt.solving.kernels.krylov import krylov_step, model_of
@@ -28,7 +27,9 @@ Step = Callable[[Equations, np.ndarray, np.ndarray, np.ndarray, float], Iterate 
 
 def forcing(residual: float, last: float) -> float:
     """Relative accuracy of the linear system that is worth its price."""
-    return FIRST if last == np.inf else min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2))
+    if last in (0.0, np.inf):
+        return FIRST if last else TIGHTEST
+    return min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2))
 
 
 def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = None, weight: float = 0.0) -> Equations:
@@ -39,7 +40,7 @@ def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = Non
         problem.q,
         problem.V,
         problem.s,
-        lambda y: coulomb_map(y, problem.mu, problem.bilateral),
+        problem.law.project,
         1 / np.maximum(compliance, 1e-3),
         center,
         weight,
@@ -99,7 +100,7 @@ def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
     bodies Newton's method cycles from there, because it takes contacts for sliding before friction acts.
     """
     zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
-    glued = np.full(len(problem.q), problem.bilateral or len(problem.s) > 0) | (problem.q[:, 0] < 0)
+    glued = (problem.law.lowest < 0) | (len(problem.s) > 0) | (problem.q[:, 0] < 0)
     if not glued.any():
         return zero
     D = np.where(glued[:, None, None], np.eye(problem.dim), 0.0)

@@ -9,22 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactopt.problem.cones import disc_derivative
 from contactopt.solving.kernels.semismooth import Projection
 
 STEPS = 50
 EXACT = 1e-13  # relative error of the balance at which the search ends
 CURVATURE = 1e-10  # relative to V'V, added to the Newton matrix: nothing need be in contact at the start
-
-
-def cylinder_derivative(y: np.ndarray, radius: np.ndarray, bilateral: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of y (k, dim) on r_n >= 0 (bilateral: any r_n), |r_t| <= radius (k,), and its derivative."""
-    P, D = y.copy(), np.zeros((*y.shape, y.shape[1]))
-    D[:, 0, 0] = 1.0
-    if not bilateral:
-        P[:, 0], D[:, 0, 0] = np.maximum(y[:, 0], 0), y[:, 0] > 0
-    P[:, 1:], D[:, 1:, 1:] = disc_derivative(y[:, 1:], radius)
-    return P, D
 
 
 def project_balanced(

@@ -13,6 +13,7 @@ preconditioned system is that well conditioned whatever sticks, slips or is open
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 
 import numpy as np
@@ -23,7 +24,10 @@ from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import loosened
 from contactopt.solving.kernels.semismooth import Equations
+from contactopt.solving.notes import note
 from contactopt.solving.preconditioners import Preconditioner, deflated, preconditioner, restricted, smooth_motions
+
+logger = logging.getLogger(__name__)
 
 FLAT = 1e-8  # eigenvalues of D below this are zero
 RESTART, CYCLES = 60, 3  # of GMRES
@@ -38,16 +42,17 @@ Step = tuple[np.ndarray, np.ndarray]  # dr (k, d), dlambda (p,)
 def model_of(problem: InterfaceProblem, name: str | None = None) -> Preconditioner:
     """The preconditioner of that name with the smooth motions deflated; 'none': the identity.
 
-    None: `neumann` where the contacts lie on a grid, else the identity.
+    None: `neumann` where the contacts lie on a grid, else the identity, with a note that says why.
     """
     n = problem.q.size
     if name != "none":
         try:
             P, Q = preconditioner(problem, name or "neumann"), loosened(problem.Q, MODEL)
             return deflated(P, Q, smooth_motions(problem))
-        except InputError:
+        except InputError as error:
             if name is not None:
                 raise
+            note(logger, f"no preconditioner fits these contacts, so iterative steps go without one: {error}")
     return Preconditioner(n, lambda x: x)
 
 

@@ -3,19 +3,24 @@
 With P the projection onto half-lines, intervals or discs this is the primal-dual active set method of one convex
 subproblem, and a few steps of it make a backend's approximate answer exact (`crossover`): an interior-point answer is
 the square root of its accuracy away from the solution wherever force and gap vanish together. With P the Coulomb map of
-contactopt.problem.cones it is Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 2008).
+contactopt.problem.laws it is Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 2008).
 """
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
 
 from contactopt.errors import BackendError
 from contactopt.problem.operators import Interface
+from contactopt.solving.notes import note
+
+logger = logging.getLogger(__name__)
 
 # y (k, d) -> P(y) and its generalised derivative (k, d, d); zero where the contact is open
 Projection = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -26,26 +31,24 @@ GOOD = 1e-14  # relative residual below which rounding is all that is left
 EXACT, WRONG = 1e-9, 1e-5  # relative residuals up to which an answer needs no second try, and above which it is none
 
 
+@dataclass(frozen=True, eq=False)
 class Equations:
     """The equations of one dimensionless problem: Q (kd, kd), q (k, d), V (kd, p), s (p,), rho (k,) or a number.
 
     center, weight: with weight > 0 those of the proximal subproblem, u = Q r + V lambda + q + weight (r - center).
     """
 
-    def __init__(
-        self,
-        Q: Interface,
-        q: np.ndarray,
-        V: np.ndarray,
-        s: np.ndarray,
-        project: Projection,
-        rho: np.ndarray | float = 1.0,
-        center: np.ndarray | None = None,
-        weight: float = 0.0,
-    ):
-        self.Q, self.q, self.V, self.s, self.project = Q, q, V, s, project
-        self.rho = np.broadcast_to(np.asarray(rho, dtype=float), (len(q),))
-        self.center, self.weight = center, weight
+    Q: Interface
+    q: np.ndarray
+    V: np.ndarray
+    s: np.ndarray
+    project: Projection
+    rho: np.ndarray = 1.0  # type: ignore[assignment]
+    center: np.ndarray | None = None
+    weight: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rho", np.broadcast_to(np.asarray(self.rho, dtype=float), (len(self.q),)))
 
     def evaluate(self, r: np.ndarray, lam: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """Norm of the residual, P(y) - r (k, d), V'r + s (p,) and the derivative of P at y = r - rho u."""
@@ -118,7 +121,10 @@ def crossover(
 
     Q (kd, kd), c (kd,), V (kd, p), s (p,); the problem is dimensionless, so that rho = 1 is right.
     """
-    return _improve(Equations(Q, c.reshape(r.shape), V, s, project), r, multipliers, steps)[1:]
+    residual, r, multipliers = _improve(Equations(Q, c.reshape(r.shape), V, s, project), r, multipliers, steps)
+    if steps == STEPS and residual > EXACT * max(1.0, float(np.linalg.norm(r))):
+        note(logger, "Newton steps did not make the answer of a convex subproblem exact")
+    return r, multipliers
 
 
 def certified(
@@ -132,7 +138,9 @@ def certified(
     backend, if even the best answer misses the problem it was given by more than WRONG.
     """
     best, asked = (np.inf, np.zeros(0), np.zeros(0)), ""
-    for asked, solver in solvers:  # noqa: B007 (named in the message)
+    for attempt, (asked, solver) in enumerate(solvers):
+        if attempt:
+            note(logger, f"the answer of backend '{asked}' was not exact, so it was asked again at tighter settings")
         r, multipliers = solver()
         answer = _improve(equations, r.reshape(equations.q.shape), multipliers, STEPS)
         best = min(best, answer, key=lambda a: a[0])

@@ -8,11 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.cones import disc_derivative, half_line_derivative, split, whole_line_derivative
+from contactopt.problem.cones import disc_derivative, half_line_derivative, split
 from contactopt.solving.backends import attempts
 from contactopt.solving.backends.conic import DiscSOCP
 from contactopt.solving.backends.qp import BoxQP
-from contactopt.solving.kernels.semismooth import Equations, certified
+from contactopt.solving.kernels.semismooth import Equations, Projection, certified
 
 
 def _index(k: int, dim: int, normal: bool) -> np.ndarray:
@@ -29,14 +29,14 @@ class NormalProblem:
         self.Q, self.Q_nt = problem.Q[np.ix_(n, n)], problem.Q[np.ix_(n, t)]
         self.V, self.V_t, self.V_other = problem.V[n][:, columns], problem.V[t][:, columns], problem.V[n][:, ~columns]
         self.qp = BoxQP.using(backend, self.Q, self.V.T)
-        self.low = np.full(problem.contacts, -np.inf if problem.bilateral else 0.0)
+        self.low = problem.law.lowest
 
     def solve(self, r: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """r (k, dim) with new r_n, and the multipliers of this problem's balance rows."""
         r_n, r_t = split(r)
         c = self.problem.q[:, 0] + self.Q_nt @ r_t.ravel() + self.V_other @ multipliers[~self.columns]
         s = self.problem.s[self.columns] + self.V_t.T @ r_t.ravel()
-        project = whole_line_derivative if self.problem.bilateral else half_line_derivative
+        project: Projection = lambda y: half_line_derivative(y, self.low)  # noqa: E731
         tries = attempts(self.qp, lambda qp: qp.solve(c, -s, self.low, np.full(len(c), np.inf), start=r_n))
         new, lam = certified(tries, Equations(self.Q, c[:, None], self.V, s, project))
         return np.concatenate([new, r_t], axis=1), lam
@@ -50,7 +50,7 @@ class TangentialProblem:
         self.problem, self.columns = problem, columns
         self.Q, self.Q_tn = problem.Q[np.ix_(t, t)], problem.Q[np.ix_(t, n)]
         self.V, self.V_n, self.V_other = problem.V[t][:, columns], problem.V[n][:, columns], problem.V[t][:, ~columns]
-        self.active = bool(np.any(problem.mu > 0))
+        self.active = bool(np.any(problem.law.rough))
         if self.active:
             bridge = BoxQP if problem.dim == 2 else DiscSOCP
             self.solver = bridge.using(backend, self.Q, self.V.T)
@@ -62,7 +62,7 @@ class TangentialProblem:
             return np.concatenate([r_n[:, None], np.zeros_like(r_t)], axis=1), np.zeros(0)
         c = self.problem.q[:, 1:].ravel() + self.Q_tn @ r_n + self.V_other @ multipliers[~self.columns]
         s = self.problem.s[self.columns] + self.V_n.T @ r_n
-        radius = self.problem.mu * np.abs(r_n)
+        radius = self.problem.law.bound(r_n)
         if isinstance(self.solver, BoxQP):
             tries = attempts(self.solver, lambda qp: qp.solve(c, -s, -radius, radius, start=r_t.ravel()))
         else:

@@ -12,7 +12,7 @@ import numpy as np
 
 from contactopt.errors import BackendError
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.cones import disc_derivative, half_line_derivative, whole_line_derivative
+from contactopt.problem.cones import disc_derivative, half_line_derivative
 from contactopt.problem.operators import diagonal
 from contactopt.solving.kernels.krylov import krylov_step
 from contactopt.solving.kernels.semismooth import Equations, Projection
@@ -97,16 +97,14 @@ class KrylovSubproblem:
 
     def _projection(self, given: np.ndarray) -> Projection:
         """y (k, dim) -> the projection of the own components beside the given others, and its derivative."""
-        problem, own = self.problem, self.own
-        radius = problem.mu * np.abs(given[:, 0])
+        own, low, radius = self.own, self.problem.law.lowest, self.problem.law.bound(given[:, 0])
 
         def project(y: np.ndarray) -> Iterate:
             P, D = given.copy(), np.zeros((*y.shape, y.shape[1]))
             if not self.normal:
                 P[:, own], D[:, own, own] = disc_derivative(y[:, own], radius)
             else:
-                line = whole_line_derivative if problem.bilateral else half_line_derivative
-                P[:, own], D[:, own, own] = line(y[:, own])
+                P[:, own], D[:, own, own] = half_line_derivative(y[:, own], low)
             return P, D
 
         return project

@@ -4,6 +4,10 @@ A method is a frozen dataclass whose fields are its settings. `iterate(problem, 
 InterfaceProblem and yields (reactions (k, dim), multipliers (p,)) after each outer iteration, from a cold start if
 `start` is None; the driver (contactopt.solve) owns the clock, the stopping rule, the history and the limits. A method
 that ends by itself has met its own criterion or cannot go on.
+
+Two statements are optional. `implicit = True` says that it takes a Q that is known by its products only. `solves(law)` says
+whether it solves problems of that law (contactopt.problem.laws); a method without it solves every law, because it needs
+nothing of a law but its projection.
 """
 
 from __future__ import annotations
@@ -15,7 +19,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.problem import InterfaceProblem
+from contactopt.problem import InterfaceProblem, Law
 
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
 
@@ -74,6 +78,17 @@ METHODS = {
 
 
 NATIVE = "native"  # in place of a backend's name: our own linear algebra
+
+
+def solves(method: Any, law: Law) -> bool:
+    """Whether a method solves problems of that law; one that says nothing about it solves all."""
+    predicate = getattr(method, "solves", None)
+    return predicate is None or bool(predicate(law))
+
+
+def solvers_of(law: Law) -> list[str]:
+    """Names of the methods that solve problems of that law."""
+    return [name for name in METHODS if solves(find_method(name), law)]
 
 
 def default_method(settings: Mapping[str, Any]) -> str:

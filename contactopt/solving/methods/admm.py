@@ -4,8 +4,8 @@
 r from one linear system with Q + rho I and the balance rows, z by projection, the scaled multiplier x of r = z by
 their difference; -rho x is the velocity u + g n, which renews g in every iteration. For fixed g this converges for
 every rho; with g renewed there is no proof, it needs no full rank of Q, but
-strong friction may defeat it (reports/robustness). Bilateral contact: r_n is free and the discs have the radius mu |r_n|. Cost: one factorisation of Q +
-rho I, 2 n^3/3 operations (LU, since a Q from a file need not be quite symmetric), and n^2 per iteration. rho is
+strong friction may defeat it (reports/robustness). Other laws have other sets and openings (contactopt.problem.laws);
+where both are fixed, as for Tresca's and associated friction, it always converges. Cost: one factorisation of Q + rho I, 2 n^3/3 operations (LU, since a Q from a file need not be quite symmetric), and n^2 per iteration. rho is
 balanced after 10, 20, 40, ... iterations where that is worth a factorisation, so that the errors of r = z and of the
 velocity fall together.
 Sources: Acary, Cadoux, Lemarechal, Malick (2011) for the form with g; Boyd, Parikh, Chu, Peleato, Eckstein (2011),
@@ -23,7 +23,6 @@ import scipy.linalg as la
 
 from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.cones import coulomb_cone, disc
 from contactopt.solving.methods import NATIVE, Iterate
 
 OVER = 1.6  # over-relaxation, between 1.5 and 1.8 in the literature
@@ -49,15 +48,15 @@ class ADMM:
         rho, count, check = self.rho, 0, FIRST
         system = Balanced(problem, rho)
         x = np.zeros_like(z) if start is None else -problem.displacements(z, multipliers) / rho
-        if start is not None and not problem.bilateral:
-            x[:, 0] -= problem.mu * np.linalg.norm(x[:, 1:], axis=1)
+        law = problem.law
+        if start is not None:
+            x[:, 0] -= law.opening(x[:, 1:])
         while True:
             right = rho * (z - x) - problem.q
-            if not problem.bilateral:
-                right[:, 0] -= problem.mu * rho * np.linalg.norm(x[:, 1:], axis=1)
+            right[:, 0] -= rho * law.opening(x[:, 1:])
             r, multipliers = system.solve(right, problem.s)
             relaxed, old = OVER * r + (1 - OVER) * z, z
-            z = _project(relaxed + x, problem)
+            z = law.nearest(relaxed + x, (relaxed + x)[:, 0])
             x = x + relaxed - z
             yield z, multipliers
             count += 1
@@ -70,12 +69,6 @@ class ADMM:
                 if not 1 / WORTH < factor < WORTH:
                     rho, x = rho * factor, x / factor
                     system = Balanced(problem, rho)
-
-
-def _project(y: np.ndarray, problem: InterfaceProblem) -> np.ndarray:
-    if not problem.bilateral:
-        return coulomb_cone(y, problem.mu)
-    return np.concatenate([y[:, :1], disc(y[:, 1:], problem.mu * np.abs(y[:, 0]))], axis=1)
 
 
 class Balanced:

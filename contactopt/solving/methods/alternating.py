@@ -22,6 +22,7 @@ import numpy as np
 from contactopt.checks import check_number
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
+from contactopt.problem.laws import Law
 from contactopt.solving.backends import CONIC, QP, find
 from contactopt.solving.kernels.krylov import model_of
 from contactopt.solving.kernels.splitting import NormalProblem, TangentialProblem
@@ -61,6 +62,9 @@ class Alternating:
         tangential = self.tangential or ("proxqp" if dim == 2 else "clarabel")
         return find(self.normal, QP).name, find(tangential, QP if dim == 2 else CONIC).name
 
+    def solves(self, law: Law) -> bool:
+        return not law.dilatant
+
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)  # columns with normal entries
         normal, tangential = self._subproblems(problem, pushes)
@@ -82,5 +86,5 @@ class Alternating:
 
 
 def _check_friction(problem: InterfaceProblem, tangential: np.ndarray) -> None:
-    if tangential.any() and not np.any(problem.mu > 0):
+    if tangential.any() and not np.any(problem.law.rough):
         raise InputError("a plate that moves tangentially needs friction to hold it, but mu = 0.")

@@ -3,8 +3,8 @@
 Acary and Cadoux's form of Coulomb friction: with the slip's contribution g_i = mu_i |u_t,i| held fixed, the forces
 solve
     min  r'Qr/2 + (q + g n)' r    subject to  |r_t| <= mu r_n,  V'r + s = 0,
-a convex program over Coulomb's cones; g is renewed from its answer (the outer iteration that is yielded). For
-bilateral contact the bound mu |r_n| is held instead and r_n is free. An inner iteration costs one product with Q
+a convex program over Coulomb's cones; g is renewed from its answer (the outer iteration that is yielded). Other laws
+have other sets and openings (contactopt.problem.laws); for bilateral contact the bound mu |r_n| is held. An inner iteration costs one product with Q
 (Nesterov's step 1 / largest eigenvalue, restarted where the momentum points uphill), an outer one many of them. The inner iteration always converges, in a number of steps like the square root of Q's condition number, and
 for singular Q more slowly; the fixed point has no proof of convergence.
 Sources: O'Donoghue, Candes (2015), Adaptive restart; Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the
@@ -20,8 +20,9 @@ from math import sqrt
 import numpy as np
 
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.cones import coulomb_cone_derivative, disc
-from contactopt.solving.kernels.balance import cylinder_derivative, project_balanced
+from contactopt.problem.cones import disc
+from contactopt.problem.laws import Projected
+from contactopt.solving.kernels.balance import project_balanced
 from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue
 from contactopt.solving.methods import NATIVE, Iterate
 
@@ -41,16 +42,13 @@ class APG:
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
         step = 1 / (MARGIN * largest_eigenvalue(problem.Q) or 1.0)
-        target = 1e-3
+        law, target = problem.law, 1e-3
         while True:
-            q, bound = problem.q.copy(), problem.mu * np.abs(r[:, 0])
-            if not problem.bilateral:
-                q[:, 0] += problem.mu * np.linalg.norm(problem.displacements(r, lam)[:, 1:], axis=1)
+            q, r_n = problem.q.copy(), r[:, 0]
+            q[:, 0] += law.opening(problem.displacements(r, lam)[:, 1:])
 
-            def project(y: np.ndarray, bound: np.ndarray = bound) -> tuple[np.ndarray, np.ndarray]:
-                if problem.bilateral:
-                    return cylinder_derivative(y, bound, bilateral=True)
-                return coulomb_cone_derivative(y, problem.mu)
+            def project(y: np.ndarray, r_n: np.ndarray = r_n) -> Projected:
+                return law.nearest_derivative(y, r_n)
 
             prox = lambda y, lam, P=project: project_balanced(P, y, problem.V, problem.s, step, lam)  # noqa: E731
             gradient = lambda y, q=q: (problem.Q @ y.ravel()).reshape(q.shape) + q  # noqa: E731

@@ -1,7 +1,7 @@
 """Augmented Lagrangian method (method of multipliers) for contact and friction together, after Alart and Curnier.
 
 The forces are the multipliers of the contact conditions; the penalty rho augments them, and each iteration sets
-    r_j = P(r_{j-1} - rho u_j),  P Coulomb's map (contactopt.problem.cones.coulomb_map),  u_j = Q r_j + V lambda + q,
+    r_j = P(r_{j-1} - rho u_j),  P the map of the law (contactopt.problem.laws),  u_j = Q r_j + V lambda + q,
 with the balance V' r_j + s = 0. Seen from the forces this is the proximal-point iteration (Rockafellar): r_j solves
 Coulomb's problem with the compliance Q + I / rho, u = Q r_j + V lambda + q + (r_j - r_{j-1}) / rho. The default solves
 it exactly by semismooth Newton steps, one dense linear system each; rho does not change, unlike in `proximal`, so the
@@ -24,8 +24,10 @@ import numpy as np
 
 from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
+from contactopt.problem.cones import cylinder_derivative
+from contactopt.problem.laws import Law
 from contactopt.solving.kernels.alart_curnier import cold_start
-from contactopt.solving.kernels.balance import cylinder_derivative, project_balanced
+from contactopt.solving.kernels.balance import project_balanced
 from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue
 from contactopt.solving.methods import NATIVE, Iterate
 from contactopt.solving.methods.proximal import proximal_step
@@ -44,6 +46,10 @@ class AugmentedLagrangian:
     def backends(self, dim: int) -> tuple[str, str]:
         return NATIVE, NATIVE
 
+    def solves(self, law: Law) -> bool:
+        """The exact variant solves every law; Uzawa's holds friction bounds, which associated friction has not."""
+        return not (self.explicit and law.dilatant)
+
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         return self._uzawa(problem, start) if self.explicit else self._exact(problem, start)
 
@@ -56,11 +62,11 @@ class AugmentedLagrangian:
 
     def _uzawa(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:
         r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        rho = 1 / (MARGIN * largest_eigenvalue(problem.Q) or 1.0)
+        rho, low = 1 / (MARGIN * largest_eigenvalue(problem.Q) or 1.0), problem.law.lowest
         while True:
             y = r - rho * ((problem.Q @ r.ravel()).reshape(r.shape) + problem.q)
             height = y[:, 0] - rho * (problem.V @ lam).reshape(r.shape)[:, 0]
-            bound = problem.mu * (np.abs(height) if problem.bilateral else np.maximum(height, 0))
-            law = lambda y, bound=bound: cylinder_derivative(y, bound, problem.bilateral)  # noqa: E731
-            r, lam = project_balanced(law, y, problem.V, problem.s, rho, lam)
+            bound = problem.law.bound(height)
+            discs = lambda y, bound=bound: cylinder_derivative(y, bound, low)  # noqa: E731
+            r, lam = project_balanced(discs, y, problem.V, problem.s, rho, lam)
             yield r, lam

@@ -13,6 +13,7 @@ may have none.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from itertools import count, islice
@@ -20,16 +21,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from contactopt.errors import BackendError
+from contactopt.errors import BackendError, InputError
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.cones import coulomb_cone
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations
 from contactopt.solving.methods import NATIVE, Iterate
 from contactopt.solving.methods.cone import AcaryCadoux
 from contactopt.solving.methods.newton import Newton
 from contactopt.solving.methods.proximal import Proximal
+from contactopt.solving.notes import note
 from contactopt.solving.preconditioners import find_preconditioner
+
+logger = logging.getLogger(__name__)
 
 LIMIT = 25  # Newton steps
 PATIENCE = 6  # of them without progress
@@ -54,7 +57,12 @@ class Auto:
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         reached = yield from self._newton(problem, start, self.preconditioner)
-        problem = problem.explicit()  # all that follows looks at the entries of Q
+        note(logger, "Newton's method made no progress, so cone programs and the proximal loop take over")
+        try:
+            problem = problem.explicit()  # all that follows looks at the entries of Q
+        except InputError as error:
+            note(logger, f"the default method ends with Newton's steps: {error}")
+            return
         reached = yield from self._cones(problem, reached)
         random = np.random.default_rng(0)
         for restarts in count():
@@ -62,7 +70,8 @@ class Auto:
             r = random.normal(size=problem.q.shape)
             r[:, 0] = np.abs(r[:, 0])
             r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
-            reached = coulomb_cone(r, problem.mu), last[1]
+            reached = problem.law.nearest(r, r[:, 0]), last[1]
+            note(logger, "the proximal loop got nowhere and started again from random forces")
 
     @staticmethod
     def _newton(
@@ -84,7 +93,7 @@ class Auto:
     @staticmethod
     def _cones(problem: InterfaceProblem, start: Iterate) -> Generator[Iterate, None, Iterate]:
         """A few cone programs; returns the best point, `start` if there was none better."""
-        if problem.bilateral:
+        if not AcaryCadoux().solves(problem.law):
             return start
         equations = coulomb_equations(problem)
         best, reached = equations.evaluate(*start)[0], start
@@ -93,8 +102,8 @@ class Auto:
                 yield point
                 residual = equations.evaluate(*point)[0]
                 best, reached = min((best, reached), (residual, point), key=lambda pair: pair[0])
-        except BackendError:  # no answer: the proximal loop needs none
-            pass
+        except BackendError as error:  # no answer: the proximal loop needs none
+            note(logger, f"the cone programs of the default method gave no answer: {error}")
         return reached
 
     @staticmethod

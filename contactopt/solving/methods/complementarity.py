@@ -21,6 +21,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
+from contactopt.problem.laws import Law
 from contactopt.solving.methods import NATIVE, Iterate
 
 LARGEST = 300  # contacts: the tableau has 2 (4 x 300)^2 entries
@@ -29,7 +30,10 @@ PIVOT, TIE = 1e-10, 1e-12  # least pivot; relative distance of equal ratios
 
 @dataclass(frozen=True)
 class Lemke:
-    """No settings. InputError in 3D, for bilateral contact and for more than 300 contacts."""
+    """No settings. InputError in 3D and for more than 300 contacts."""
+
+    def solves(self, law: Law) -> bool:
+        return law.unilateral and law.proportional and not law.dilatant
 
     def backends(self, dim: int) -> tuple[str, str]:
         if dim != 2:
@@ -37,10 +41,8 @@ class Lemke:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        if problem.dim != 2 or problem.bilateral or problem.contacts > LARGEST:
-            raise InputError(
-                f"the method 'lemke' needs a 2D unilateral problem of at most {LARGEST} contacts; use 'auto'."
-            )
+        if problem.dim != 2 or problem.contacts > LARGEST:
+            raise InputError(f"the method 'lemke' needs a 2D problem of at most {LARGEST} contacts; use 'auto'.")
         for copositive in (False, True):
             M, q, C = complementarity_problem(problem, copositive)
             z = lemke(M, q)

@@ -6,7 +6,7 @@ Both solve, over Coulomb's cones,
 slips its gap opens by mu |u_t|, so that a block dragged along a plane rises from it. It gets stick, open contacts and
 problems without slip right; where contacts slip, forces and approach are off by a term that grows with mu.
 `AcaryCadoux` repeats it with s = |u_t| of the last answer, which takes the opening back; a fixed point is exactly a
-solution of Coulomb's problem. Each outer iteration costs one SOCP, whose matrices are handed over once; the answer is
+solution of Coulomb's problem. On a problem whose law is associated friction both solve that law, in one program. Each outer iteration costs one SOCP, whose matrices are handed over once; the answer is
 made exact by Newton steps on r = P(r - u), P the projection on the cones. Converges linearly where mu times the
 coupling of slip and dilatancy is small; there is no proof. Where Q
 is badly rank-deficient the Newton steps may fail, and the certificate stays at what the backend's accuracy gives.
@@ -26,6 +26,7 @@ import numpy as np
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import coulomb_cone_derivative
+from contactopt.problem.laws import Law
 from contactopt.solving.backends import CONIC, find
 from contactopt.solving.backends.conic import Conic
 from contactopt.solving.backends.direct import CoulombSOCP
@@ -54,13 +55,16 @@ class AcaryCadoux:
     def backends(self, dim: int) -> tuple[str, str]:
         return (find(self.backend, CONIC).name,) * 2
 
+    def solves(self, law: Law) -> bool:
+        return law.unilateral and law.proportional
+
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         solve = cone_program(problem, self.bridge, self.backends(problem.dim)[0])
-        s = np.zeros(problem.contacts) if start is None else _slip(problem, *start)
+        opening = np.zeros(problem.contacts) if start is None else _opening(problem, *start)
         while True:
-            r, multipliers = solve(s)
+            r, multipliers = solve(opening)
             yield r, multipliers
-            s = _slip(problem, r, multipliers)
+            opening = _opening(problem, r, multipliers)
 
 
 @dataclass(frozen=True)
@@ -71,16 +75,13 @@ class Relaxation(AcaryCadoux):
         return islice(super().iterate(problem), 1)
 
 
-def _slip(problem: InterfaceProblem, r: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-    return np.asarray(np.linalg.norm(problem.displacements(r, multipliers)[:, 1:], axis=1))
+def _opening(problem: InterfaceProblem, r: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    """mu |u_t| (k,), zero where the law is associated friction itself."""
+    return problem.law.opening(problem.displacements(r, multipliers)[:, 1:])
 
 
 def cone_program(problem: InterfaceProblem, bridge: str, backend: str) -> Callable[[np.ndarray], Iterate]:
-    """s (k,) -> r (k, dim) and multipliers (p,) of the program above; InputError for contact without separation."""
-    if problem.bilateral:
-        raise InputError(
-            "contact without separation has no cone of forces; use method 'auto', 'newton', 'tresca' or 'alternating'."
-        )
+    """Opening mu s (k,) -> r (k, dim) and multipliers (p,) of the program above."""
     c, V, s_plates = problem.q.copy(), problem.V, problem.s
     if bridge == "cvxpy":
         from contactopt.models import acary_cadoux
@@ -89,10 +90,11 @@ def cone_program(problem: InterfaceProblem, bridge: str, backend: str) -> Callab
     else:
         direct = CoulombSOCP.using(problem.Q, problem.mu, V, s_plates)
 
-    def solve(s: np.ndarray) -> Iterate:
-        c[:, 0] = problem.q[:, 0] + problem.mu * s
+    def solve(opening: np.ndarray) -> Iterate:
+        c[:, 0] = problem.q[:, 0] + opening
         if bridge == "cvxpy":
-            answer = conic.solve(s=s)
+            mu = problem.mu
+            answer = conic.solve(s=np.divide(opening, mu, out=np.zeros_like(mu), where=mu > 0))
             r, lam = answer["r"], answer["approach"]
         else:
             r, lam = direct.solve(c.ravel())

@@ -23,6 +23,7 @@ import numpy as np
 from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
+from contactopt.problem.laws import Law
 from contactopt.solving.kernels.balance import project_balanced
 from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue, smalbe
 from contactopt.solving.kernels.semismooth import Projection, crossover
@@ -45,6 +46,9 @@ class Lagrangian:
 
     def backends(self, dim: int) -> tuple[str, str]:
         return NATIVE, NATIVE
+
+    def solves(self, law: Law) -> bool:
+        return not law.dilatant
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
@@ -79,11 +83,10 @@ class Part:
 
     def exact(self, r_n: np.ndarray, r_t: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The normal QP."""
-        bilateral = self.problem.bilateral
+        low = self.problem.law.lowest
         c, V, s = self.data(r_t, lam)
-        low = np.full(len(c), -np.inf if bilateral else 0.0)
         rough = smalbe(self.Q, c, low, V.T, -s, r_n, lam[self.own], ROUGH)
-        project: Projection = (lambda y: (y, np.ones((len(y), 1, 1)))) if bilateral else half_line_derivative
+        project: Projection = lambda y: half_line_derivative(y, low)  # noqa: E731
         r, new = crossover(self.Q, c, V, s, project, rough.x[:, None], rough.multipliers)
         return r[:, 0], new
 
@@ -92,7 +95,7 @@ class Part:
     ) -> tuple[np.ndarray, np.ndarray]:
         """The tangential program, until a step moves r_t by at most accuracy times the first step."""
         c, V, s = self.data(r_n, lam)
-        radius, own, first = self.problem.mu * np.abs(r_n), lam[self.own], 0.0
+        radius, own, first = self.problem.law.bound(r_n), lam[self.own], 0.0
         for _ in range(INNER):
             y = r_t - self.step * ((self.Q @ r_t.ravel()) + c).reshape(self.shape)
             new, own = project_balanced(lambda y: disc_derivative(y, radius), y, V, s, self.step, own)

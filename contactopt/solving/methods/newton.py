@@ -1,6 +1,6 @@
 """Semismooth Newton method on the Alart-Curnier equations, the primal-dual active set method for Coulomb friction.
 
-Solves r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 with P the Coulomb map (contactopt.problem.cones.coulomb_map): each step
+Solves r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 with P the map of the law (contactopt.problem.laws): each step
 sorts the contacts into open, sticking and slipping and solves one linear system of the closed ones: dense, n^3/3 to
 2 n^3/3 operations, or, where Q is an operator, by PCG and GMRES to the accuracy that the step is worth (Eisenstat, Walker
 1996), some ten products with Q each (contactopt.solving.kernels.krylov). Full steps from the bonded solution; the number of steps hardly depends on the mesh
@@ -12,8 +12,9 @@ three-dimensional contact problems with Coulomb friction.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -23,7 +24,10 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import InterfaceOperator, loosened
 from contactopt.solving.kernels.alart_curnier import FIRST, cold_start, coulomb_equations, dense, forcing, krylov
 from contactopt.solving.methods import NATIVE, Iterate
+from contactopt.solving.notes import note
 from contactopt.solving.preconditioners import find_preconditioner
+
+logger = logging.getLogger(__name__)
 
 SHARP = 1e-4  # accuracy of a residual, over the residual that the step aimed at
 
@@ -62,12 +66,13 @@ class Newton:
         last, rtol = np.inf, FIRST
         while True:
             aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
-            equations.Q = loosened(problem.Q, SHARP * aim)
-            residual, error, balance, D = equations.evaluate(r, multipliers)
+            sharp = replace(equations, Q=loosened(problem.Q, SHARP * aim))
+            residual, error, balance, D = sharp.evaluate(r, multipliers)
             # P(y): at the solution equal to r, and within the bounds to the last digit
             yield (r + error, multipliers), residual
             rtol = forcing(residual, last)
-            change = step(equations, error, balance, D, rtol)
+            change = step(sharp, error, balance, D, rtol)
             if change is None:
+                note(logger, "Newton's method ended because the linear system of a step could not be solved")
                 return
             r, multipliers, last = r + change[0], multipliers + change[1], residual

@@ -22,6 +22,7 @@ import numpy as np
 from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
+from contactopt.problem.laws import Law
 from contactopt.solving.methods import NATIVE, Iterate
 
 ROOT = 1e-14  # relative accuracy of the local slip problem
@@ -41,6 +42,9 @@ class NSGS:
     def backends(self, dim: int) -> tuple[str, str]:
         return NATIVE, NATIVE
 
+    def solves(self, law: Law) -> bool:
+        return law.proportional and not law.dilatant
+
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         (k, dim), V, s = problem.q.shape, problem.V, problem.s
         r, lam = (np.zeros((k, dim)), np.zeros(len(s))) if start is None else (start[0].copy(), start[1])
@@ -48,7 +52,8 @@ class NSGS:
         tau = PENALTY / np.maximum(np.sum(V**2, axis=0), 1e-300)
         rows = np.ascontiguousarray(problem.Q + (V * tau) @ V.T).reshape(k, dim, k * dim)
         blocks = [rows[i, :, dim * i : dim * (i + 1)] for i in range(k)]
-        contacts = [Local(W, float(mu), problem.bilateral) for W, mu in zip(blocks, problem.mu)]
+        open_ = problem.law.lowest == 0
+        contacts = [Local(W, float(mu), not apart) for W, mu, apart in zip(blocks, problem.mu, open_)]
         while True:
             w = problem.q + (V @ (lam + tau * s)).reshape(k, dim)
             for i, local in enumerate(contacts):

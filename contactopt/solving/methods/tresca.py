@@ -21,11 +21,12 @@ import numpy as np
 
 from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.cones import disc_derivative, half_line_derivative
+from contactopt.problem.cones import cylinder_derivative
+from contactopt.problem.laws import Law
 from contactopt.solving.backends import CONIC, QP, find
 from contactopt.solving.backends.conic import Conic
 from contactopt.solving.backends.qp import BoxQP
-from contactopt.solving.kernels.semismooth import crossover
+from contactopt.solving.kernels.semismooth import Projection, crossover
 from contactopt.solving.methods import Iterate
 
 
@@ -46,19 +47,17 @@ class Tresca:
         name = self.backend or ("proxqp" if dim == 2 else "clarabel")
         return (find(name, QP if dim == 2 else CONIC).name,) * 2
 
+    def solves(self, law: Law) -> bool:
+        return not law.dilatant
+
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         convex = TrescaProblem(self.backends(problem.dim)[0], problem)
         r = glued(problem) if start is None else start[0]
-        g = problem.mu * _size(problem, r)
+        g = problem.law.bound(r[:, 0])
         while True:
             r, multipliers = convex.solve(g, r)
-            g = g + self.relaxation * (problem.mu * _size(problem, r) - g)
+            g = g + self.relaxation * (problem.law.bound(r[:, 0]) - g)
             yield r, multipliers
-
-
-def _size(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:
-    """The normal force that friction counts, (k,)."""
-    return np.abs(r[:, 0]) if problem.bilateral else np.maximum(r[:, 0], 0.0)
 
 
 def glued(problem: InterfaceProblem) -> np.ndarray:
@@ -76,7 +75,7 @@ class TrescaProblem:
 
     def __init__(self, backend: str, problem: InterfaceProblem):
         self.problem = problem
-        self.low = np.full(problem.contacts, -np.inf if problem.bilateral else 0.0)
+        self.low = problem.law.lowest
         self.solver: BoxQP | Conic
         if problem.dim == 2:
             self.solver = BoxQP.using(backend, problem.Q, problem.V.T)
@@ -94,18 +93,5 @@ class TrescaProblem:
         else:
             answer = self.solver.solve(g=g)
             r, lam = answer["r"], answer["approach"]
-        return crossover(
-            problem.Q, c, problem.V, problem.s, lambda y: self._project(y, g), r.reshape(problem.q.shape), lam
-        )
-
-    def _project(self, y: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Projection on half-lines times discs, and its generalised derivative."""
-        k, dim = y.shape
-        D = np.zeros((k, dim, dim))
-        if self.problem.bilateral:
-            normal, D[:, 0, 0] = y[:, :1], 1.0
-        else:
-            normal, slope = half_line_derivative(y[:, :1])
-            D[:, 0, 0] = slope[:, 0, 0]
-        tangential, D[:, 1:, 1:] = disc_derivative(y[:, 1:], g)
-        return np.concatenate([normal, tangential], axis=1), D
+        project: Projection = lambda y: cylinder_derivative(y, g, self.low)  # noqa: E731
+        return crossover(problem.Q, c, problem.V, problem.s, project, r.reshape(problem.q.shape), lam)

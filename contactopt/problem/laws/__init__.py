@@ -1,0 +1,227 @@
+"""Laws of contact and friction: one file each, one line here. Nothing is imported before it is used.
+
+A law says which forces a contact can carry and how they go with its displacement. It is a frozen dataclass whose fields
+are its parameters, one number per contact, and an InterfaceProblem carries it. Every law here can be written in De Saxce's
+form with a closed convex set K_i of forces per contact and an opening g_i that slip adds to the gap:
+
+    r_i = proj_{K_i} (r_i - rho (u_i + g_i(u_t) n)),      for one and then every rho > 0.
+
+    law            K, forces that a contact can carry                  g, added to the gap
+    coulomb        |r_t| <= mu r_n                                     mu |u_t|
+    frictionless   r_n >= 0, r_t = 0                                   0
+    associated     |r_t| <= mu r_n                                     0: slip itself opens the gap by mu |u_t|
+    tresca         r_n >= 0, |r_t| <= bound                            0
+    bilateral      |r_t| <= mu |r_n|, the bound taken as given         0
+
+Sources: De Saxce, Feng (1998), The bipotential method; Alart, Curnier (1991), A mixed formulation for frictional contact
+problems prone to Newton like solution methods.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+from importlib import import_module
+from typing import Any, Self
+
+import numpy as np
+
+from contactopt.checks import real_array
+from contactopt.errors import InputError
+
+PRESSED = 1e-10  # normal forces above this, relative to the largest, are contact
+BELOW = 1e-6  # a tangential force sticks if it is below its bound by more than this, relative to the bound
+
+Projected = tuple[np.ndarray, np.ndarray]  # points (k, dim) and the generalised derivative (k, dim, dim)
+
+# name -> (module, class, what it is)
+LAWS = {
+    "coulomb": ("contactopt.problem.laws.coulomb", "Coulomb", "contact that may open; Coulomb friction"),
+    "bilateral": ("contactopt.problem.laws.bilateral", "Bilateral", "no separation; friction bound mu |r_n|"),
+    "tresca": ("contactopt.problem.laws.tresca", "Tresca", "contact that may open; friction bound given beforehand"),
+    "associated": (
+        "contactopt.problem.laws.associated",
+        "Associated",
+        "Coulomb's cone; slip opens the gap by mu |u_t|",
+    ),
+    "frictionless": ("contactopt.problem.laws.frictionless", "Frictionless", "contact that may open; no friction"),
+}
+
+
+class Law:
+    """What all laws share. A law of its own needs `bound` and `nearest_derivative`; the rest has defaults.
+
+    The fields of a law are its parameters: arrays (k,) of numbers that are not negative, or one number for all contacts.
+    Methods ask a law for these properties, never for its name:
+
+    convex        solutions minimise r' Q r / 2 + q' r over a fixed convex set, and `project` is the projection on it
+    proportional  the forces of a contact lie within |r_t| <= mu |r_n|
+    dilatant      slip opens the gap
+    """
+
+    convex: bool = False
+    proportional: bool = False
+    dilatant: bool = False
+
+    def __post_init__(self) -> None:
+        for name in self.parameters:
+            value = real_array(name, getattr(self, name))
+            if value.ndim > 1:
+                raise InputError(f"{name} must be a number or one number per contact; got shape {value.shape}.")
+            if np.any(value < 0):
+                what = {"mu": "the friction coefficient mu", "limit": "the friction bound"}.get(name, name)
+                raise InputError(f"{what} must not be negative; its least value is {value.min():g}.")
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(f.name for f in fields(self))  # type: ignore[arg-type]
+
+    @property
+    def contacts(self) -> int:
+        """Number of contacts k of a law whose parameters are arrays."""
+        return len(getattr(self, self.parameters[0]))
+
+    @property
+    def lowest(self) -> np.ndarray:
+        """(k,) least normal force [force]: 0 where a contact may open, -inf where it cannot."""
+        return np.zeros(self.contacts)
+
+    @property
+    def unilateral(self) -> bool:
+        """Whether every contact may open."""
+        return bool(np.all(self.lowest == 0))
+
+    @property
+    def coefficient(self) -> np.ndarray:
+        """(k,) friction coefficients, 0 where the law has none."""
+        return np.zeros(self.contacts)
+
+    @property
+    def rough(self) -> np.ndarray:
+        """(k,) mask of the contacts that can carry a tangential force."""
+        return self.coefficient > 0
+
+    def bound(self, r_n: np.ndarray) -> np.ndarray:
+        """(k,) largest |r_t| [force] under the normal forces r_n (k,)."""
+        raise NotImplementedError
+
+    def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
+        """The projection of y (k, dim) on the set K of forces, and its generalised derivative.
+
+        Where K depends on the normal force it is that of r_n (k,), which the derivative takes as given.
+        """
+        raise NotImplementedError
+
+    def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
+        """The projection alone, (k, dim)."""
+        return self.nearest_derivative(y, r_n)[0]
+
+    def project(self, y: np.ndarray) -> Projected:
+        """The map P of Newton's equations r = P(r - rho u), and its generalised derivative, at y (k, dim)."""
+        return self.nearest_derivative(y, y[:, 0])
+
+    def opening(self, u_t: np.ndarray) -> np.ndarray:
+        """g (k,) [length]: what is added to the gap where contacts slip by u_t (k, dim - 1)."""
+        return np.zeros(len(u_t))
+
+    def natural_map(self, r: np.ndarray, u: np.ndarray, rho: float | np.ndarray) -> np.ndarray:
+        """proj_K(r - rho (u + g n)) (k, dim): equal to r exactly where r and u obey the law.
+
+        Parameters
+        ----------
+        r, u
+            Forces and displacements (k, dim), normal first.
+        rho
+            Step [force / length], one number or one per contact (k,).
+        """
+        step = np.asarray(rho)[..., None] if np.ndim(rho) else rho
+        shifted = r - step * u
+        shifted[:, 0] -= rho * self.opening(u[:, 1:])
+        return self.nearest(shifted, r[:, 0])
+
+    def pressed(self, r: np.ndarray) -> np.ndarray:
+        """(k,) mask of the contacts that carry a normal force beyond rounding."""
+        size = np.abs(r[:, 0])
+        return np.asarray(size > PRESSED * size.max(initial=0.0))
+
+    def sticking(self, r: np.ndarray) -> np.ndarray:
+        """(k,) mask of the pressed contacts whose tangential force is below its bound."""
+        return self.pressed(r) & (np.linalg.norm(r[:, 1:], axis=1) < (1 - BELOW) * self.bound(r[:, 0]))
+
+    def slipping(self, r: np.ndarray) -> np.ndarray:
+        """(k,) mask of the pressed contacts whose tangential force is at its bound."""
+        return self.pressed(r) & ~self.sticking(r)
+
+    def scaled(self, force: float) -> Self:
+        """The same law where forces are counted in units of `force`."""
+        return self
+
+    def times(self, factor: float) -> Self:
+        """The same law with its friction multiplied by a factor."""
+        return self._mapped(lambda parameter: factor * parameter)
+
+    def select(self, contacts: np.ndarray) -> Law:
+        """The law of some contacts alone: indices, with repetitions if wanted, or a mask."""
+        return self._mapped(lambda parameter: parameter[contacts])
+
+    def spread(self, k: int) -> Self:
+        """The law of k contacts: numbers become arrays (k,). InputError on arrays of another length."""
+        for name in self.parameters:
+            if np.ndim(getattr(self, name)) and np.shape(getattr(self, name)) != (k,):
+                raise InputError(f"{name} must have shape {(k,)}; got {np.shape(getattr(self, name))}.")
+        return self._mapped(lambda parameter: np.broadcast_to(parameter, (k,)))
+
+    @classmethod
+    def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Law:
+        """The law of a scene's contacts from the values (k,) that the scene gives and the nodal areas (k,).
+
+        The values are friction coefficients unless the law says otherwise.
+        """
+        return cls(values)  # type: ignore[call-arg]
+
+    @property
+    def digest(self) -> bytes:
+        """The law's name and parameters as bytes, for a problem's fingerprint."""
+        name = type(self).__name__.encode()
+        return name + b"".join(np.ascontiguousarray(getattr(self, p)).tobytes() for p in self.parameters)
+
+    def _mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> Self:
+        return replace(self, **{name: change(getattr(self, name)) for name in self.parameters})  # type: ignore[type-var]
+
+
+def find_law(name: str) -> type[Law]:
+    """The class of the law of that name; InputError if there is none."""
+    if name not in LAWS:
+        raise InputError(f"unknown law {name!r}; choose from {', '.join(LAWS)}.")
+    module, cls, _ = LAWS[name]
+    law: type[Law] = getattr(import_module(module), cls)
+    return law
+
+
+def make_law(name: str, value: Any, areas: np.ndarray, places: np.ndarray) -> Law:
+    """The law that a scene means at its contacts.
+
+    Parameters
+    ----------
+    name
+        A name in LAWS.
+    value
+        What the law reads: a friction coefficient, or for `tresca` a traction bound [stress]. One number, an array (k,),
+        or a function of the places (dim, k) that gives either.
+    areas, places
+        Nodal areas (k,) and positions (dim, k) of the contacts.
+
+    Raises
+    ------
+    InputError
+        On an unknown name and on values that are not numbers, negative, or not one per contact.
+    """
+    values = real_array("the friction of a scene", value(places) if callable(value) else value)
+    if values.shape not in ((), areas.shape):
+        raise InputError(
+            f"the friction of a scene must be one number or one per contact, shape {areas.shape}; got {values.shape}."
+        )
+    return find_law(name).of_place(np.broadcast_to(values, areas.shape), areas).spread(len(areas))

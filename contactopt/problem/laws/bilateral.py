@@ -1,0 +1,43 @@
+"""Contact without separation: the gap stays zero, the normal force may pull, and friction counts its size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactopt.problem.cones import cylinder_derivative, disc, disc_of_height, split
+from contactopt.problem.laws import Law, Projected
+
+
+@dataclass(frozen=True, eq=False)
+class Bilateral(Law):
+    """u_n = 0;  |r_t| <= mu |r_n|, and where u_t != 0: r_t = -mu |r_n| u_t / |u_t|.
+
+    mu  (k,) friction coefficients
+    """
+
+    mu: np.ndarray
+    proportional = True
+
+    @property
+    def coefficient(self) -> np.ndarray:
+        return self.mu
+
+    @property
+    def lowest(self) -> np.ndarray:
+        return np.full(self.contacts, -np.inf)
+
+    def bound(self, r_n: np.ndarray) -> np.ndarray:
+        return np.asarray(self.mu * np.abs(r_n))
+
+    def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
+        return np.concatenate([y[:, :1], disc(y[:, 1:], self.bound(r_n))], axis=1)
+
+    def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
+        return cylinder_derivative(y, self.bound(r_n), -np.inf)
+
+    def project(self, y: np.ndarray) -> Projected:
+        """y_n itself, and y_t projected on the disc of radius mu |y_n|."""
+        n, t = split(y)
+        return disc_of_height(n, t, self.mu, np.sign(n))

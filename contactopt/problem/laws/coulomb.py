@@ -1,0 +1,48 @@
+"""Coulomb friction at contacts that may open: the law of contactopt.problem.interface_problem, eqs (15) to (17)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative, disc_of_height, split
+from contactopt.problem.laws import Law, Projected
+
+
+@dataclass(frozen=True, eq=False)
+class Coulomb(Law):
+    """u_n >= 0, r_n >= 0, u_n r_n = 0;  |r_t| <= mu r_n, and where u_t != 0: r_t = -mu r_n u_t / |u_t|.
+
+    mu  (k,) friction coefficients
+    """
+
+    mu: np.ndarray
+    proportional = True
+
+    @property
+    def coefficient(self) -> np.ndarray:
+        return self.mu
+
+    def bound(self, r_n: np.ndarray) -> np.ndarray:
+        return np.asarray(self.mu * np.maximum(r_n, 0.0))
+
+    def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
+        return coulomb_cone(y, self.mu)
+
+    def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
+        return coulomb_cone_derivative(y, self.mu)
+
+    def project(self, y: np.ndarray) -> Projected:
+        """Alart and Curnier's map: max(y_n, 0), and y_t projected on the disc of radius mu max(y_n, 0).
+
+        It is no projection on a convex set, but r = P(r - rho u) exactly at the solutions of Coulomb's law.
+        """
+        n, t = split(y)
+        closed = n > 0
+        P, D = disc_of_height(np.maximum(n, 0.0), t, self.mu, closed.astype(float))
+        D[~closed] = 0.0
+        return P, D
+
+    def opening(self, u_t: np.ndarray) -> np.ndarray:
+        return np.asarray(self.mu * np.linalg.norm(u_t, axis=1))

@@ -1,0 +1,39 @@
+"""Contact that may open and carries no friction: Signorini's conditions alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactopt.errors import InputError
+from contactopt.problem.cones import cylinder_derivative
+from contactopt.problem.laws import Law, Projected
+
+
+@dataclass(frozen=True, eq=False)
+class Frictionless(Law):
+    """u_n >= 0, r_n >= 0, u_n r_n = 0;  r_t = 0.
+
+    mu  zero, and nothing to choose: it only counts the contacts
+    """
+
+    mu: np.ndarray = 0.0  # type: ignore[assignment]
+    convex = True
+    proportional = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if np.any(self.mu):
+            raise InputError("contact without friction has mu = 0; for another value use the law 'coulomb'.")
+
+    def bound(self, r_n: np.ndarray) -> np.ndarray:
+        return np.zeros(len(r_n))
+
+    def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
+        return cylinder_derivative(y, np.zeros(len(y)))
+
+    @classmethod
+    def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Frictionless:
+        """Whatever the value that the scene gives: it has no meaning for this law."""
+        return cls(np.zeros(len(areas)))

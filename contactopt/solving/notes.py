@@ -1,0 +1,33 @@
+"""What a solve did otherwise than asked or expected, in sentences: logged where it happens and kept in the Solution.
+
+A method that falls back on something weaker or dearer calls `note`. The driver opens `collected` around each solve; the
+list belongs to that solve alone, also where solves run in several threads or one inside another.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+_notes: ContextVar[list[str] | None] = ContextVar("notes of the solve that runs", default=None)
+
+
+def note(logger: logging.Logger, sentence: str) -> None:
+    """Log a sentence, and keep it for the Solution of the solve that runs; a sentence is kept once."""
+    logger.info(sentence)
+    notes = _notes.get()
+    if notes is not None and sentence not in notes:
+        notes.append(sentence)
+
+
+@contextmanager
+def collected() -> Iterator[list[str]]:
+    """The list that grows by the notes made inside the `with` block."""
+    notes: list[str] = []
+    token = _notes.set(notes)
+    try:
+        yield notes
+    finally:
+        _notes.reset(token)
