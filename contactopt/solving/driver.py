@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.checks import check_number
+from contactopt.checks import check_number, real_array
 from contactopt.errors import BackendError, InputError
 from contactopt.problem import InterfaceProblem, Scales, Solution, Status, dimensionless, natural_map_residual
 from contactopt.problem.operators import InterfaceOperator, loosened
@@ -87,9 +87,9 @@ def _run(
     start: Solution | None,
     progress: Callable[[int, float], None] | None,
 ) -> Solution:
-    _check_equilibrium(problem)
     if problem.contacts == 0:
         return _without_contacts(problem, method, tol)
+    _check_equilibrium(problem)
     if not getattr(method, "implicit", False):
         problem = problem.explicit()
     scaled, scales = dimensionless(problem)
@@ -145,14 +145,14 @@ def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> 
 def _dimensionless_start(start: Solution, problem: InterfaceProblem, scales: Scales) -> tuple[np.ndarray, np.ndarray]:
     if not isinstance(start, Solution):
         raise InputError(f"start must be a Solution; got {type(start).__name__}.")
-    if start.reactions.shape != problem.q.shape or start.multipliers.shape != problem.s.shape:
+    r = real_array("the start's array of reactions", start.reactions)
+    multipliers = real_array("the start's array of multipliers", start.multipliers)
+    if r.shape != problem.q.shape or multipliers.shape != problem.s.shape:
         raise InputError(
-            f"start has reactions {start.reactions.shape} and {len(start.multipliers)} multipliers; this problem needs "
+            f"start has reactions {r.shape} and {len(multipliers)} multipliers; this problem needs "
             f"{problem.q.shape} and {len(problem.s)}."
         )
-    if not (np.all(np.isfinite(start.reactions)) and np.all(np.isfinite(start.multipliers))):
-        raise InputError("start holds a number that is not finite.")
-    return scales.to_dimensionless(start.reactions, start.multipliers)
+    return scales.to_dimensionless(r, multipliers)
 
 
 class _Recorder:

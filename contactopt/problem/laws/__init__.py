@@ -55,7 +55,7 @@ class Law:
     Methods ask a law for these properties, never for its name:
 
     convex        solutions minimise r' Q r / 2 + q' r over a fixed convex set, and `project` is the projection on it
-    proportional  the forces of a contact lie within |r_t| <= mu |r_n|
+    proportional  the friction bound is mu |r_n|, with mu the coefficient
     dilatant      slip opens the gap
     """
 
