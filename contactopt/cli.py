@@ -14,6 +14,7 @@ from typing import Any
 from contactopt.analysis.quantities import QUANTITIES
 from contactopt.bodies.solvers import SOLVERS
 from contactopt.errors import InputError
+from contactopt.problem.laws import LAWS
 from contactopt.problem.operators import FORMS
 from contactopt.scenes import PATHS, SCENES
 from contactopt.solving.backends import CONIC, QP
@@ -175,6 +176,9 @@ def _list(options: argparse.Namespace) -> int:
     print("scenes")
     for name, (_, what) in SCENES.items():
         print(f"  {name:26} {what}" + (" (load path)" if name in PATHS else ""))
+    print("laws of contact")
+    for name, (_, _, what) in LAWS.items():
+        print(f"  {name:20} {what}")
     print("methods")
     for name, (_, _, what) in METHODS.items():
         print(f"  {name:20} {what}")

@@ -132,7 +132,7 @@ def test_a_system_in_rest_and_units():
     ],
 )
 def test_problems_it_cannot_take(problem):
-    with pytest.raises(InputError, match="needs a 2D problem of at most|does not solve the law Bilateral"):
+    with pytest.raises(InputError, match=r"needs a 2D problem of at most|does not solve the law Bilateral"):
         solve(problem, Lemke())
     with pytest.raises(InputError, match="2D problem of Coulomb's law with at most"):
         all_solutions(problem)

@@ -15,6 +15,7 @@ TEXT = (ROOT / "CONTRIBUTING.md").read_text()
 TABLES = {
     "A scene": ("contactopt.scenes", "SCENES"),
     "A method": ("contactopt.solving.methods", "METHODS"),
+    "A law": ("contactopt.problem.laws", "LAWS"),
     "A backend": ("contactopt.solving.backends", "CONIC"),
     "A preconditioner": ("contactopt.solving.preconditioners", "PRECONDITIONERS"),
 }

@@ -1,11 +1,14 @@
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, Status, natural_map_residual, solve
+from contactopt.benchmark.problems import rigid_bodies
+from contactopt.problem.operators import InterfaceOperator
+from contactopt.solving.methods import METHODS
 
 
 @dataclass(frozen=True)
@@ -87,3 +90,85 @@ def test_progress_is_reported():
     seen = []
     solve(PROBLEM, Scripted(WRONG), max_iterations=3, progress=lambda i, residual: seen.append((i, residual)))
     assert [i for i, _ in seen] == [1, 2, 3] and all(residual > 0 for _, residual in seen)
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+@pytest.mark.parametrize("dim", [2, 3])
+def test_no_contacts_need_no_forces(dim, method):
+    solution = solve(InterfaceProblem(np.zeros((0, 0)), np.zeros((0, dim)), 0.3), method)
+    assert solution.solved and solution.reactions.shape == (0, dim)
+
+
+def test_no_contacts_cannot_balance_a_load():
+    pressed = InterfaceProblem(np.zeros((0, 0)), np.zeros((0, 2)), 0.3, np.zeros((0, 1)), [-1.0])
+    solution = solve(pressed)
+    assert solution.status is Status.SETTLED and "no contact" in solution.message
+
+
+SOLVED = solve(PROBLEM)
+
+
+@pytest.mark.parametrize(
+    "bad,message",
+    [
+        (dict(method=3), "method must be a name or an object"),
+        (dict(time_limit=np.nan), "time_limit must be"),
+        (dict(time_limit=-1.0), "time_limit must be"),
+        (dict(time_limit="long"), "time_limit must be"),
+        (dict(start=np.zeros((1, 2))), "start must be a Solution"),
+        (dict(start=replace(SOLVED, reactions=np.array([[np.nan, 0.0]]))), "not finite"),
+        (dict(start=replace(SOLVED, reactions=np.array([[np.inf, 0.0]]))), "not finite"),
+        (dict(start=replace(SOLVED, reactions="all")), "array of numbers"),
+    ],
+)
+def test_arguments_of_the_wrong_kind(bad, message):
+    with pytest.raises(InputError, match=message):
+        solve(PROBLEM, **bad)
+
+
+def test_a_tolerance_below_rounding_ends_without_an_exception():
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        k, dim = rng.integers(1, 8), rng.integers(2, 4)
+        A = rng.normal(size=(k * dim, k * dim))
+        problem = InterfaceProblem(A @ A.T, rng.normal(size=(k, dim)), rng.uniform(0, 1))
+        assert isinstance(solve(problem, tol=1e-16, max_iterations=40).status, Status)
+
+
+def test_fallbacks_are_told(caplog):
+    """Contacts at random places have no grid for a preconditioner; the answer says so, and so does the log."""
+    rng = np.random.default_rng(1)
+    A = rng.normal(size=(36, 36))
+    problem = InterfaceProblem(
+        A @ A.T / 36 + np.eye(36), rng.normal(size=(12, 3)) - 0.5, 0.3, coordinates=rng.random((3, 12))
+    )
+    assert solve(problem).notes == ()
+    with caplog.at_level("INFO"):
+        solution = solve(problem, "newton", linear="krylov")
+    assert solution.solved and any("no preconditioner fits" in sentence for sentence in solution.notes)
+    assert "no preconditioner fits" in caplog.text
+    assert solve(problem).notes == ()  # the notes of one solve are its own
+
+
+def test_the_default_says_when_it_changes_its_method():
+    """Rigid bodies that share forces among too many contacts: Newton's method alone does not get there."""
+    problem = rigid_bodies(bodies=4, contacts=12, mu=0.8, seed=0)
+    assert not solve(problem, "newton", max_iterations=100).solved
+    solution = solve(problem)
+    assert solution.solved and any("the proximal loop take over" in sentence for sentence in solution.notes)
+
+
+def test_seconds_are_those_of_the_method_and_of_the_certificate(punch):
+    solution = solve(punch)
+    assert set(solution.seconds) == {"solve", "certificate"} and min(solution.seconds.values()) > 0
+    assert solution.seconds["solve"] == solution.history[-1]["seconds"]
+
+
+def test_a_q_that_does_not_fit_into_memory_is_not_formed():
+    n = 40_000
+    Q = InterfaceOperator(lambda X, accuracy: X, np.ones(n))
+    problem = InterfaceProblem(Q, np.full((n // 2, 2), -1.0), 0.3)
+    with pytest.raises(InputError, match=r"Q in full would take 12.8 GB, more than the 8 GB"):
+        solve(problem, "nsgs")
+    solution = solve(problem)
+    assert solution.solved and np.allclose(solution.reactions[:, 0], 1.0)

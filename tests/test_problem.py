@@ -110,6 +110,14 @@ def test_reactions_that_are_not_finite(punch):
         (dict(Q=np.array([[1.0, 0.5], [0.0, 1.0]])), "symmetric"),
         (dict(q=np.zeros((1, 4))), "2 or 3 columns"),
         (dict(s=np.ones(1)), "V must have shape"),
+        (dict(V=np.ones((2, 1))), "V has columns but s is empty"),
+        (dict(Q=1j * np.eye(2)), "Q must be real"),
+        (dict(Q="text"), "Q must be an array of numbers"),
+        (dict(Q=[[1.0, 0.0], [1.0]]), "rows have different lengths"),
+        (dict(q=[["a", "b"]]), "q must be an array of numbers"),
+        (dict(q=None), "q must be an array of numbers"),
+        (dict(law="steel"), "mu must be an array of numbers"),
+        (dict(law=[0.1, 0.2]), "mu must have shape"),
     ],
 )
 def test_bad_problems_are_refused(change, message):

@@ -271,11 +271,11 @@ assert (ratio["auto"] < np.inf).mean() > (ratio["guess_and_sort"] < np.inf).mean
 # <details><summary>Solution</summary>
 #
 # In 3D a slipping contact may slip in any direction of the plane. The direction is an unknown, so the equations of a
-# given sorting are not linear. Newton's method linearises them: see `contactopt.problem.cones.coulomb_map`.
+# given sorting are not linear. Newton's method linearises them: see `contactopt.problem.laws.coulomb`.
 #
 # ```python
-# from contactopt.problem.cones import coulomb_map
-# P, D = coulomb_map(np.array([[1.0, 3.0, 4.0]]), np.array([0.5]))
+# from contactopt.problem.laws.coulomb import Coulomb
+# P, D = Coulomb(np.array([0.5])).project(np.array([[1.0, 3.0, 4.0]]))
 # assert np.allclose(P, [[1.0, 0.3, 0.4]])  # on the disc of radius mu y_n
 # assert np.linalg.matrix_rank(D[0]) == 2  # it may still turn: not fixed, not free
 # ```
