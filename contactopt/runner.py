@@ -161,7 +161,7 @@ def _summary(
         "scene": scene.name,
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
-        "mu": float(scene.mu),
+        "mu": float(problem.mu.max()),
         "method": method,
         "normal_backend": backends[0],
         "tangential_backend": backends[1],
