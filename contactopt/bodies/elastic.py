@@ -11,6 +11,7 @@ compliance: C = A_ff^-1 + soft soft', where each column of `soft` is one of them
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,6 +26,7 @@ from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Part, Scene
 
+log = logging.getLogger(__name__)
 KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body's stiffness is free
 
 
@@ -229,6 +231,7 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     A = body.A[body.free][:, body.free]
     last = place[interface] if entries else None
     made = make_solver(solver, System(A, node[body.free], component[body.free], body.locations, last))
+    log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
     extended = body.motion.copy()
     extended[body.free] -= made.solve((body.A @ body.motion)[body.free])
     K = extended.T @ (body.A @ extended)

@@ -121,8 +121,8 @@ def _line(
     end = 0.0
     for number, (chain, steps) in enumerate(chains):
         if number:
-            link = _step(contacts.points, tangents, chains[number - 1][0][-1], chain[0])
-            end += abs(link)
+            link = chains[number - 1][0][-1:], chain[:1]
+            end += abs(float(_steps(contacts.points, tangents, *link)[0]))
         place[chain] = end + np.concatenate([[0.0], np.cumsum(steps)])
         end = float(place[chain[-1]])
     if period is not None:
@@ -139,10 +139,9 @@ def _chains(contacts: ContactPoints, tangents: np.ndarray) -> tuple[list[tuple[n
     """The pieces of the contact line in their order, each as contacts and the steps between them; the period of a loop."""
     k = contacts.points.shape[1]
     following, length = np.full(k, -1), np.zeros(k)
-    for i, j in contacts.cells.T:
-        step = _step(contacts.points, tangents, i, j)
-        first, second = (i, j) if step >= 0 else (j, i)
-        following[first], length[first] = second, abs(step)
+    step = _steps(contacts.points, tangents, *contacts.cells)
+    first, second = np.where(step >= 0, contacts.cells, contacts.cells[::-1])
+    following[first], length[first] = second, np.abs(step)
     started = np.setdiff1d(np.arange(k), following[following >= 0])
     if not len(started) and k > 0:  # a closed line
         start = _least(contacts.gap, contacts.size)
@@ -166,11 +165,11 @@ def _walk(following: np.ndarray, start: int) -> np.ndarray:
     return np.array(chain)
 
 
-def _step(points: np.ndarray, tangents: np.ndarray, i: int, j: int) -> float:
-    """From contact i to contact j along the mean of their tangents; on a circle this is the chord."""
+def _steps(points: np.ndarray, tangents: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """From the contacts i to the contacts j along the mean of their tangents; on a circle this is the chord."""
     mean, chord = tangents[:, i] + tangents[:, j], points[:, j] - points[:, i]
-    size = float(np.linalg.norm(mean))
-    return float(mean @ chord) / size if size > NEAR else float(np.linalg.norm(chord))
+    size, along = np.linalg.norm(mean, axis=0), np.sum(mean * chord, axis=0)
+    return np.where(size > NEAR, along / np.maximum(size, NEAR), np.linalg.norm(chord, axis=0))
 
 
 def _least(gap: np.ndarray, size: float) -> int:

@@ -27,7 +27,7 @@ from contactopt.errors import InputError
 from contactopt.interface.costs import form_of
 from contactopt.interface.coupling import Coupling, couple
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.operators import FORMS, InterfaceOperator, estimate_diagonal, nodal_weights
+from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, estimate_diagonal, nodal_weights
 from contactopt.scenes.scene import Scene
 
 log = logging.getLogger(__name__)
@@ -147,6 +147,8 @@ def reduce_bodies(
         contact, largest = (max(getattr(b, size) for b in assembled) for size in ("interface_unknowns", "unknowns"))
         Q = form_of(contact, largest, scene.dim, any(b.iterates(solver) for b in assembled))
     log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, maps[0].shape[0])
+    if Q == "explicit":
+        check_dense(maps[0].shape[0])
     bodies = each(lambda body: body.prepare(solver, Q == "explicit"), assembled)
     seconds["factorise"] = time.perf_counter() - start
 
