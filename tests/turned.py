@@ -91,7 +91,8 @@ def punch(dim: int = 2, elements: int = 6, mu: float = 0.3) -> Scene:
     def lower(elements, zone):
         across = [_even(20.0, 80.0, elements), _even(wide, 70.0, elements)][: dim - 1]
         mesh = rename(tensor_mesh(*across, -graded(80.0, 20.0 / elements, 1.5)[::-1]), bottom=f"{up}-", top=f"{up}+")
-        shifted = replace(mesh, doflocs=mesh.p + np.array([20.0, wide, 0.0][: dim - 1] + [0.0])[:, None])
+        corner = np.array([20.0, wide, 0.0] if dim == 3 else [20.0, 0.0])
+        shifted = replace(mesh, doflocs=mesh.p + corner[:, None])
         cut = patch(shifted, "top", "contact", [40.0, 2 * wide][: dim - 1])
         inside = cut.p[:, cut.facets[:, cut.boundaries["contact"]]].mean(axis=1)[: dim - 1].min(axis=0) > 0
         return mesh.with_boundaries({"contact": cut.boundaries["contact"][inside]})

@@ -34,8 +34,9 @@ def assemble(scene: Scene, part: Any, elements: int, zone: float | None) -> Asse
     InputError
         For a part of a class that no kind of body models, and for parts that cannot be modelled.
     """
-    for kind, (module, function, _) in BODIES.items():
-        if isinstance(part, kind):
+    for kind in type(part).__mro__:  # the class itself before what it derives from
+        if kind in BODIES:
+            module, function, _ = BODIES[kind]
             made: AssembledBody = getattr(import_module(module), function)(scene, part, elements, zone)
             return made
     known = ", ".join(kind.__name__ for kind in BODIES)

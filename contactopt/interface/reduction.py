@@ -84,7 +84,7 @@ class Reduction:
         looked at. Raises InputError if supports or plates hold other unknowns than here.
         """
         start = time.perf_counter()
-        bodies = tuple(old.loaded(scene, part) for old, part in zip(self.bodies, (scene.upper, scene.lower)))
+        bodies = tuple(old.loaded(scene, part) for old, part in zip(self.bodies, scene.parts))
         q, V, s = _linear_terms(bodies, self.maps, self.coupling)
         mu = scene.friction(self.coupling.positions)
         problem = replace(self.problem, q=q, V=V, s=s, mu=mu, bilateral=scene.bilateral)
@@ -137,7 +137,7 @@ def reduce_bodies(
     zone = scene.zone if zone is None else zone
     seconds: dict[str, float] = {}
     start = time.perf_counter()
-    assembled = [assemble(scene, part, elements, zone) for part in (scene.upper, scene.lower)]
+    assembled = [assemble(scene, part, elements, zone) for part in scene.parts]
     coupled = couple(scene, assembled[0], assembled[1], coupling)
     maps = (coupled.upper, -coupled.lower)
     seconds["assemble"] = time.perf_counter() - start

@@ -159,6 +159,11 @@ class Scene:
             self._check_part(part)
 
     @property
+    def parts(self) -> tuple[Part | Rigid, ...]:
+        """The bodies, upper first."""
+        return self.upper, self.lower
+
+    @property
     def components(self) -> tuple[str, ...]:
         return COMPONENTS[self.kind]
 
