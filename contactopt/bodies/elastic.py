@@ -179,7 +179,7 @@ class AssembledElastic:
             tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
             held[unknowns[:, trace.nodes]],
             trace.cells,
-            Mesh(body.basis, facets, body.weight, nodes, unknowns[:, nodes]),
+            Mesh(body.basis, body.degree, facets, body.weight, body.locations, unknowns, held, self.part.curve),
         )
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:

@@ -33,17 +33,23 @@ Product = Callable[[np.ndarray, float | None], np.ndarray]
 class Mesh:
     """The finite elements behind a contact surface, for couplings that integrate over it.
 
-    basis    scikit-fem basis of the displacement, which holds the mesh
-    facets   (f,) numbers of the mesh facets that make up the surface
-    measure  factor of all integrals (thickness, mirror images), and whether they also carry the radius r
-    nodes    (m,) nodes of the body that lie on the surface;  unknowns (dim, m) their displacement unknowns
+    basis      scikit-fem basis of the displacement, which holds the mesh;  degree  of the displacement, 1 or 2
+    facets     (f,) numbers of the mesh facets that make up the surface
+    measure    factor of all integrals (thickness, mirror images), and whether they also carry the radius r
+    locations  (dim, nodes) positions of all nodes of the body [length];  unknowns (dim, nodes) their displacement unknowns
+    held       (n,) mask of the unknowns that are not free
+    curve      function (dim, j) -> (dim, j) that puts points of the facets on the surface that the mesh stands for; None:
+               the facets are this surface
     """
 
     basis: Any
+    degree: int
     facets: np.ndarray
     measure: tuple[float, bool]
-    nodes: np.ndarray
+    locations: np.ndarray
     unknowns: np.ndarray
+    held: np.ndarray
+    curve: Callable[[np.ndarray], np.ndarray] | None
 
 
 @dataclass(frozen=True, eq=False)

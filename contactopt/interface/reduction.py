@@ -86,7 +86,7 @@ class Reduction:
         start = time.perf_counter()
         bodies = tuple(old.loaded(scene, part) for old, part in zip(self.bodies, scene.parts))
         q, V, s = _linear_terms(bodies, self.maps, self.coupling)
-        mu = scene.friction(self.coupling.positions)
+        mu = _friction(scene, self.coupling)
         problem = replace(self.problem, q=q, V=V, s=s, mu=mu, bilateral=scene.bilateral)
         seconds = {"load": time.perf_counter() - start}
         return replace(self, scene=scene, problem=problem, bodies=bodies, seconds=seconds)
@@ -155,10 +155,23 @@ def reduce_bodies(
     start = time.perf_counter()
     q, V, s = _linear_terms(bodies, maps, coupled)
     made = _operator(bodies, maps, coupled) if Q == "implicit" else _array(bodies, maps)
-    mu, areas, points = scene.friction(coupled.positions), coupled.areas, coupled.positions
+    mu, areas, points = _friction(scene, coupled), coupled.areas, coupled.positions
     problem = InterfaceProblem(made, q, mu, V, s, areas, points, scene.bilateral, coupled.chart)
     seconds["compliance"] = time.perf_counter() - start
     return Reduction(scene, problem, bodies, maps, coupled, seconds)
+
+
+def _friction(scene: Scene, coupling: Coupling) -> np.ndarray:
+    """The friction coefficient (k,) of every contact, from a number or from a function of the place."""
+    k = len(coupling.gap)
+    if not callable(scene.mu):
+        return np.full(k, float(scene.mu))
+    values = np.asarray(scene.mu(coupling.positions), dtype=float)
+    if values.shape != (k,) or not np.all(np.isfinite(values)) or np.any(values < 0):
+        raise InputError(
+            f"scene '{scene.name}': mu as a function must give one finite number >= 0 for each of the {k} contacts."
+        )
+    return values
 
 
 def _operator(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], coupling: Coupling) -> InterfaceOperator:

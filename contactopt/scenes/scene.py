@@ -176,38 +176,6 @@ class Scene:
         """Whether the mesh of a body is given, not made for a number of elements."""
         return any(isinstance(part, Part) and not callable(part.mesh) for part in (self.upper, self.lower))
 
-    @property
-    def mu_label(self) -> str:
-        """The friction coefficient for titles: the number, or that it is a function of the place."""
-        return "mu(x)" if callable(self.mu) else f"{self.mu:g}"
-
-    def friction(self, points: np.ndarray) -> np.ndarray:
-        """The friction coefficient at each of the contacts.
-
-        Parameters
-        ----------
-        points
-            (dim, k) positions of the contacts [length].
-
-        Returns
-        -------
-        (k,) coefficients.
-
-        Raises
-        ------
-        InputError
-            If mu is a function that does not give one finite number >= 0 for each contact.
-        """
-        if not callable(self.mu):
-            return np.full(points.shape[1], float(self.mu))
-        values = np.asarray(self.mu(points), dtype=float)
-        if values.shape != points.shape[1:] or not np.all(np.isfinite(values)) or np.any(values < 0):
-            raise InputError(
-                f"scene '{self.name}': mu as a function must give one finite number >= 0 for each of the "
-                f"{points.shape[1]} contacts."
-            )
-        return values
-
     def _check_part(self, part: Part | Rigid) -> None:
         if isinstance(part, Rigid):
             self._check_components(part.name, part.force or {})
