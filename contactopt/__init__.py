@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from contactopt.analysis.enumeration import all_solutions
     from contactopt.analysis.paths import PathResult, follow
     from contactopt.analytic import Reference
+    from contactopt.bodies.fields import Fields
     from contactopt.errors import BackendError, InputError
-    from contactopt.interface.recovery import Fields
     from contactopt.interface.reduction import reduce, reduce_bodies
     from contactopt.material import Material
     from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
@@ -36,7 +36,7 @@ _HOMES = {
     "analysis.enumeration": ("all_solutions",),
     "analysis.paths": ("PathResult", "follow"),
     "errors": ("BackendError", "InputError"),
-    "interface.recovery": ("Fields",),
+    "bodies.fields": ("Fields",),
     "interface.reduction": ("reduce", "reduce_bodies"),
     "problem": ("InterfaceProblem", "Solution", "Status", "natural_map_residual"),
     "problem.transfer": ("transfer",),

@@ -169,6 +169,11 @@ class Scene:
         return f"{name} = {self.mu:g}" if isinstance(self.mu, (int, float)) else f"{name} varies"
 
     @property
+    def parts(self) -> tuple[Part | Rigid, ...]:
+        """The bodies, upper first."""
+        return self.upper, self.lower
+
+    @property
     def components(self) -> tuple[str, ...]:
         return COMPONENTS[self.kind]
 

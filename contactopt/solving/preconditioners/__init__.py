@@ -103,7 +103,7 @@ def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
 
     Components that cannot move stay at rest; what is then no motion of its own is left out.
     """
-    place = problem.coordinates[: problem.dim - 1]
+    place = problem.chart.places
     place = place - place.mean(axis=1, keepdims=True)
     functions = [np.ones(problem.contacts), *(x / (np.abs(x).max() or 1.0) for x in place)]
     Z = np.concatenate([np.kron(f[:, None], np.eye(problem.dim)) for f in functions], axis=1)

@@ -40,8 +40,8 @@ def grid_of(problem: InterfaceProblem, still: np.ndarray) -> tuple[Grid, np.ndar
 
     Raises InputError where there is none.
     """
-    x = problem.coordinates[: problem.dim - 1]
-    size = np.ptp(problem.coordinates, axis=1).max(initial=0.0)
+    x = problem.chart.places
+    size = np.ptp(x, axis=1).max(initial=0.0)
     ticks, places = [], []
     for row in x:
         order = np.argsort(row)
@@ -60,7 +60,7 @@ def grid_of(problem: InterfaceProblem, still: np.ndarray) -> tuple[Grid, np.ndar
     ends = [[on_grid.take(end, axis).all(axis=across) for end in (0, -1)] for axis in range(len(shape))]
     areas = problem.areas[order]
     if len(shape) == 1:
-        weights = nodal_weights(problem.coordinates[:, order], areas, problem.dim)
+        weights = nodal_weights(x[:, order], areas, problem.dim)
     else:
         cells = np.multiply.outer(*(cells_along(t) for t in ticks)).ravel()
         weights = cells**CELL * (areas * cells.sum() / areas.sum() / cells) ** EDGE
