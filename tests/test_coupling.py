@@ -287,3 +287,38 @@ def test_bodies_work_at_the_same_time_where_they_can():
     assert each(lambda item: threading.get_ident() == here, range(3), [False, True, False]) == (True,) * 3
     with pytest.raises(ZeroDivisionError):
         each(lambda item: 1 / item, [1, 0])
+
+
+def test_a_surface_is_asked_for_by_its_name():
+    from contactopt.bodies import assemble
+
+    scene = two_blocks("plane-strain")
+    body = assemble(scene, scene.lower, 1, None)
+    assert np.array_equal(body.surface("top").points, body.surface().points) and body.meshed
+    with pytest.raises(InputError, match="body 'lower' has no contact surface 'bottom'; it has top"):
+        body.surface("bottom")
+
+
+def test_a_pin_in_a_bush_in_space():
+    """Extruded rings in any position: gaps along the radius, frames that are orthonormal and right-handed."""
+    from contactopt.scenes.discs import extrude
+
+    def body(inner, outer, contact, support, R):
+        plane = turned.ring(inner, outer, 2, 24)
+        mesh = extrude(plane.p, plane.t, np.linspace(0.0, 5.0, 3))
+        names = {
+            "inside": lambda x: np.hypot(*x[:2]) < 1.05 * inner,
+            "outside": lambda x: np.hypot(*x[:2]) > 0.95 * outer,
+        }
+        mesh = mesh.with_boundaries(names)
+        return Part(contact, replace(mesh, doflocs=R @ mesh.p), MATERIAL, (Support(support),), (), contact)
+
+    R = turned.turn_about((1.0, 2.0, -0.5), 67.0)
+    pin, bush = body(1.0, 2.0, "outside", "inside", R), body(2.1, 4.0, "inside", "outside", R)
+    made = reduce_bodies(Scene("bush", pin, bush, 0.3, kind="solid")).coupling
+    assert np.allclose(made.gap, 0.1, rtol=0.03) and len(made.gap) == 24 * 3
+    assert np.allclose(np.einsum("kac,kbc->kab", made.frames, made.frames), np.eye(3), atol=1e-12)
+    assert np.allclose(np.linalg.det(made.frames), 1.0)
+    axis = R @ [0.0, 0.0, 1.0]
+    radial = made.positions - np.outer(axis, axis @ made.positions)
+    assert np.all(np.sum(made.frames[:, 0].T * radial, axis=0) < -0.95 * 2.1)  # towards the pin

@@ -6,6 +6,7 @@ the scene's kind (thickness, 2 pi r, mirror images), so that forces and areas ar
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -31,7 +32,7 @@ class Assembly:
     lift    (n,) prescribed displacements of the supports, 0 elsewhere
     motion  (n, p) unit motions of the p plate components that may move; zero on free unknowns
     thrust  (p,) total forces on them
-    trace   of the displacement on the candidate contact boundary: contact nodes, areas, normals, weights and cells
+    traces  name of each candidate contact boundary -> trace of the displacement there: nodes, areas, normals, weights, cells
     """
 
     name: str
@@ -45,7 +46,12 @@ class Assembly:
     free: np.ndarray
     motion: np.ndarray
     thrust: np.ndarray
-    trace: Trace
+    traces: Mapping[str, Trace]
+
+    @property
+    def trace(self) -> Trace:
+        """That of the first contact boundary, which in a scene of two bodies is the only one."""
+        return next(iter(self.traces.values()))
 
     @property
     def nodes(self) -> np.ndarray:
@@ -89,12 +95,12 @@ class Assembly:
 
     @cached_property
     def surface_nodes(self) -> np.ndarray:
-        """All nodes of the contact boundary, (m,)."""
-        return np.unique(self.weights.indices)
+        """All nodes of the contact boundaries, (m,)."""
+        return np.unique(np.concatenate([trace.weights.indices for trace in self.traces.values()]))
 
     @property
     def contact_dofs(self) -> np.ndarray:
-        """Displacement unknowns of all nodes of the contact boundary, (m, dim); m = k but for quadratic simplices."""
+        """Displacement unknowns of all nodes of the contact boundaries, (m, dim); m = k but for quadratic simplices."""
         return np.asarray(self.unknowns[:, self.surface_nodes].T)
 
 
@@ -115,7 +121,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         )
     lift, held, motion, thrust = _constraints(scene, part, basis)
     _check_rigid_modes(scene, part, basis, held)
-    contact = contact_trace(basis, scene.degree, mesh.boundaries[part.contact], weight)
+    contacts = {name: contact_trace(basis, scene.degree, mesh.boundaries[name], weight) for name in (part.contact,)}
     return Assembly(
         part.name,
         scene.kind,
@@ -128,7 +134,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         np.flatnonzero(~held),
         motion,
         thrust,
-        contact,
+        contacts,
     )
 
 

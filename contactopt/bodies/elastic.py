@@ -159,22 +159,25 @@ class AssembledElastic:
 
     def surface(self, name: str | None = None) -> Surface:
         """The contact surface, with the places of its nodes on the curve that the part gives."""
-        body, trace = self.body, self.body.trace
-        if name not in (None, self.part.contact):
-            raise InputError(f"body '{self.name}' has no contact surface {name!r}; it has '{self.part.contact}'.")
-        nodes, unknowns = body.surface_nodes, body.unknowns
+        name, body = name or self.part.contact, self.body
+        if name not in body.traces:
+            raise InputError(
+                f"body '{self.name}' has no contact surface {name!r}; it has {', '.join(sorted(body.traces))}."
+            )
+        trace, unknowns = body.traces[name], body.unknowns
+        nodes = np.unique(trace.weights.indices)
         places = body.locations[:, nodes]
         if self.part.curve is not None:
             places = np.asarray(self.part.curve(places), dtype=float)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False
-        facets = np.asarray(body.basis.mesh.boundaries[self.part.contact])
+        facets = np.asarray(body.basis.mesh.boundaries[name])
         return Surface(
             body.name,
-            body.points,
-            body.normals,
-            body.areas,
-            body.weights[:, nodes],
+            body.locations[:, trace.nodes],
+            trace.normals,
+            trace.areas,
+            trace.weights[:, nodes],
             places,
             tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
             held[unknowns[:, trace.nodes]],

@@ -1,8 +1,8 @@
 """The choice between the forms of Q by their cost, with every number that it rests on.
 
-PRODUCTS and SOLVE come from the phases of whole solves, `python -m experiments.cost_ratio`: the seconds of `factorise`,
-`compliance` and the solve itself with Q='explicit' and Q='implicit'. The entries of the factors were counted on the bodies
-of the same command. LARGEST is a choice: half a gigabyte.
+`python -m experiments.form_of_q` measures PRODUCTS, SOLVE, DENSE and the entries of the factors on punches of growing size,
+and the table of costs of `python -m experiments.preconditioners` shows where the two forms cost the same. LARGEST is not
+fitted but chosen: an array of half a gigabyte.
 """
 
 from __future__ import annotations
