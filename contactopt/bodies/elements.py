@@ -85,15 +85,15 @@ class _Shapes(Sequence[Any]):
     element: skfem.Element
     mapping: skfem.mapping.Mapping
     points: np.ndarray
-    count: int
+    functions: int
 
     def __len__(self) -> int:
-        return self.count
+        return self.functions
 
     def __getitem__(self, number: Any) -> Any:
-        if not -self.count <= number < self.count:
+        if not -self.functions <= number < self.functions:
             raise IndexError(number)
-        return self.element.gbasis(self.mapping, self.points, number % self.count)
+        return self.element.gbasis(self.mapping, self.points, number % self.functions)
 
 
 def is_curved(mesh: skfem.Mesh) -> bool:

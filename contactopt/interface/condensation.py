@@ -69,7 +69,7 @@ class ReducedBody:
     def contact_motion(self, force: np.ndarray, accuracy: float | None = None) -> np.ndarray:
         """As elastic() under forces on the interface alone, right there, zero elsewhere."""
         out = np.zeros(force.shape)
-        act = self._restricted if self.solver.last is None else self.solver.trailing_product
+        act = self.solver.trailing_product if self.solver.complete else self._restricted
         out[self.interface] = act(force[self.interface], accuracy)
         if self.soft.shape[1]:
             out += self.soft @ (self.soft.T @ force)

@@ -25,7 +25,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.body import build_body, reload_body
-from contactopt.bodies.solvers import choose
+from contactopt.bodies.solvers import solver_type
 from contactopt.errors import InputError
 from contactopt.interface.condensation import ReducedBody, loaded_body, reduce_body
 from contactopt.interface.matching import match_bodies, positions
@@ -72,7 +72,7 @@ class Reduction:
     @property
     def iterative(self) -> bool:
         """Whether a body's linear system is solved by iteration."""
-        return any(b is not None and b.solver.name == "multigrid" for b in self.bodies)
+        return any(b is not None and b.solver.iterative for b in self.bodies)
 
     @property
     def dofs(self) -> int:
@@ -133,7 +133,7 @@ def reduce_bodies(
     start = time.perf_counter()
     largest = max(len(b.free) for b in bodies if b is not None)
     if Q == "auto":
-        iterative = solver == "multigrid" or (solver == "auto" and choose(largest, scene.dim) == "multigrid")
+        iterative = solver_type(solver, largest, scene.dim).iterative
         Q = form_of(max(b.contact_dofs.size for b in bodies if b is not None), largest, scene.dim, iterative)
     first, second = both(lambda b: None if b is None else reduce_body(b, solver, Q == "explicit"), bodies)
     seconds["factorise"] = time.perf_counter() - start
@@ -192,7 +192,7 @@ def _operator(
     """Q = sum T (C + soft soft') T' by its products."""
     pairs = list(zip(bodies, maps))
 
-    threads = not any(body is not None and body.solver.name == "superlu" for body in bodies)  # it keeps Python's lock
+    threads = all(body is None or body.solver.releases_lock for body in bodies)
 
     def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
         def moved(pair: tuple[ReducedBody | None, sp.csr_matrix | None]) -> np.ndarray | float:
@@ -207,8 +207,8 @@ def _operator(
         return terms[0] if len(terms) == 1 else terms[0] + terms[1]
 
     moves = np.any([_moves(T, body) for body, T in pairs if body is not None and T is not None], axis=0)
-    complete = all(body is None or body.solver.last is not None for body in bodies)
-    iterative = any(body is not None and body.solver.name == "multigrid" for body in bodies)
+    complete = all(body is None or body.solver.complete for body in bodies)
+    iterative = any(body is not None and body.solver.iterative for body in bodies)
     diagonal = estimate_diagonal(product, weights, moves)
     return InterfaceOperator(product, diagonal, entries if complete else None, None, iterative)
 

@@ -22,7 +22,7 @@ def library() -> Any | None:
         except PackageNotFoundError:
             found = []
         if found:
-            os.environ["PYPARDISO_MKL_RT"] = str(found[0].locate().resolve())
+            os.environ["PYPARDISO_MKL_RT"] = os.path.realpath(found[0].locate())
     try:
         from pypardiso import PyPardisoSolver
 

@@ -35,6 +35,7 @@ from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
 
 SINGLE = np.float32
+PIECES = 16  # in which the rows of a matrix are brought into blocks
 
 
 class MultigridSolver:
@@ -88,7 +89,7 @@ class Level:
     """
 
     A: SparseProduct
-    largest: np.float32
+    largest: np.floating
     P: sp.csr_matrix
     R: sp.csr_matrix
 
@@ -125,7 +126,7 @@ class VCycle:
         while points.shape[1] > COARSEST:
             level = SparseProduct(_scaled(blocks, scale, scale))
             P, modes, points = coarsen(blocks, modes, points)
-            blocks = sp.bsr_matrix(P.T @ blocks @ P)
+            blocks = sp.bsr_matrix(P.T @ (blocks @ P))
             coarse = _inverse_root(blocks.diagonal())
             P = _scaled(P, np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0), coarse).tocsr()
             self.levels.append(Level(level, SINGLE(largest_eigenvalue(level)), P, P.T.tocsr()))
@@ -176,7 +177,7 @@ def conjugate_gradients(A: SparseProduct, cycle: VCycle, load: np.ndarray, rtol:
 
     Raises
     ------
-    BackendError : if it does not get there within MOST iterations, or meets a number that is not finite.
+    BackendError : if it does not get there within MOST iterations, or r' B r is negative or not a number.
     """
     r = np.array(load, dtype=float)
     x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
@@ -184,10 +185,10 @@ def conjugate_gradients(A: SparseProduct, cycle: VCycle, load: np.ndarray, rtol:
         z = cycle.apply(r)
         size, previous = _dot(r, z), size
         goal = rtol**2 * size if goal is None else goal
-        if size <= goal:
+        if 0 <= size <= goal:
             return Answer(x, step)
-        if not np.isfinite(size):
-            break
+        if not 0 < size < np.inf:
+            raise BackendError("multigrid: the V-cycle is not positive definite here; take a solver with factors.")
         p = z + (size / previous) * p
         Ap = A @ p
         alpha = size / _dot(p, Ap)
@@ -263,14 +264,28 @@ def largest_eigenvalue(A: SparseProduct) -> float:
 def nodal_blocks(
     A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """A in blocks of nodes, the place of each unknown there, the nodes present; held unknowns are rows of their own."""
+    """A in blocks of nodes; its rows are made some at a time, for the copies take more than the result.
+
+    Returns
+    -------
+    The (k dim, k dim) matrix of the k nodes present, whose held unknowns are rows of their own; the place (n,) of each
+    unknown of A in it; and the nodes present (k,).
+    """
     present, own = np.unique(node, return_inverse=True)
-    place = own * dim + component
-    size = len(present) * dim
+    place, size = own * dim + component, len(present) * dim
     spread = sp.csr_matrix((np.ones(len(own)), (place, np.arange(len(own)))), (size, len(own)))
     held = np.full(size, np.median(A.diagonal()))
     held[place] = 0.0
-    return (spread @ A @ spread.T + sp.diags(held)).tobsr((dim, dim)), place, present
+    own_rows, pieces = sp.csr_matrix(sp.diags(held)), []
+    for rows in np.array_split(np.arange(size).reshape(-1, dim), PIECES):
+        first, stop = rows.size and rows[0, 0], rows.size and rows[-1, -1] + 1
+        chosen = sp.csr_matrix(spread[first:stop] @ A)
+        wide = sp.csr_matrix((chosen.data, place[chosen.indices], chosen.indptr), (stop - first, size))
+        pieces.append((wide + own_rows[first:stop]).tobsr((dim, dim)))
+    indptr = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(piece.indptr) for piece in pieces]))])
+    indices = np.concatenate([piece.indices for piece in pieces]).astype(np.int32)
+    data = np.concatenate([piece.data for piece in pieces])
+    return sp.bsr_matrix((data, indices, indptr.astype(np.int32)), (size, size)), place, present
 
 
 def _inverse_root(diagonal: np.ndarray) -> np.ndarray:

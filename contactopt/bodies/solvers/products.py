@@ -15,7 +15,6 @@ import scipy.sparse as sp
 
 from contactopt.bodies.solvers.mkl import library
 
-_TRIED = 1000  # products announced to oneMKL, so that it analyses the matrix
 _PLAIN, _GENERAL, _ROWS = 10, 20, 101  # oneMKL's names: A itself, no structure, blocks stored row by row
 
 
@@ -33,9 +32,10 @@ class SparseProduct:
 
     def __init__(self, matrix: sp.csr_matrix | sp.bsr_matrix):
         self.matrix = matrix
-        self._handle = _handle(matrix)
-        if self._handle is not None:
-            weakref.finalize(self, library().mkl_sparse_destroy, self._handle).atexit = False
+        self._mkl: Any = library()
+        self._handle = None if self._mkl is None else _handle(self._mkl, matrix)
+        if self._mkl is not None and self._handle is not None:
+            weakref.finalize(self, self._mkl.mkl_sparse_destroy, self._handle).atexit = False
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
         """A @ x for one vector x (k,) of the precision of A."""
@@ -44,13 +44,13 @@ class SparseProduct:
         x = np.ascontiguousarray(x, dtype=self.matrix.dtype)
         y = np.empty(self.matrix.shape[0], dtype=self.matrix.dtype)
         letter, number = _kind(self.matrix)
-        act = getattr(library(), f"mkl_sparse_{letter}_mv")
-        before = library().MKL_Set_Num_Threads_Local(
+        multiply = getattr(self._mkl, f"mkl_sparse_{letter}_mv")
+        before = self._mkl.MKL_Set_Num_Threads_Local(
             1
         )  # more would spin between products; bodies have threads of their own
-        failed = act(_PLAIN, number(1.0), self._handle, _Description(_GENERAL, 0, 0), _at(x), number(0.0), _at(y))
-        library().MKL_Set_Num_Threads_Local(before)
-        return y if not failed else np.asarray(self.matrix @ x)
+        failed = multiply(_PLAIN, number(1.0), self._handle, _Description(_GENERAL, 0, 0), _at(x), number(0.0), _at(y))
+        self._mkl.MKL_Set_Num_Threads_Local(before)
+        return np.asarray(self.matrix @ x) if failed else y
 
 
 def _kind(A: sp.csr_matrix) -> tuple[str, Any]:
@@ -62,22 +62,21 @@ def _at(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
-def _handle(A: sp.csr_matrix | sp.bsr_matrix) -> ctypes.c_void_p | None:
-    """oneMKL's view of A, or None where it has none: no library, 64-bit indices, blocks that are not square."""
+def _handle(mkl: Any, A: sp.csr_matrix | sp.bsr_matrix) -> ctypes.c_void_p | None:
+    """oneMKL's view of A, or None where it has none: 64-bit indices, blocks that are not square.
+
+    oneMKL is not asked to optimise the view: it would copy the matrix and gain little.
+    """
     square = A.format == "csr" or A.blocksize[0] == A.blocksize[1]
-    if library() is None or not square or A.indices.dtype != np.int32 or A.nnz == 0:
+    if not square or A.indices.dtype != np.int32 or A.nnz == 0:
         return None
     handle = ctypes.c_void_p()
     letter, _ = _kind(A)
     arrays = _at(A.indptr), _at(A.indptr[1:]), _at(A.indices), _at(A.data)
     if A.format == "csr":
-        create = getattr(library(), f"mkl_sparse_{letter}_create_csr")
-        failed = create(ctypes.byref(handle), 0, *A.shape, *arrays)
+        failed = getattr(mkl, f"mkl_sparse_{letter}_create_csr")(ctypes.byref(handle), 0, *A.shape, *arrays)
     else:
         size = A.blocksize[0]
-        create = getattr(library(), f"mkl_sparse_{letter}_create_bsr")
-        failed = create(ctypes.byref(handle), 0, _ROWS, A.shape[0] // size, A.shape[1] // size, size, *arrays)
-        if not failed:
-            library().mkl_sparse_set_mv_hint(handle, _PLAIN, _Description(_GENERAL, 0, 0), _TRIED)
-            library().mkl_sparse_optimize(handle)
+        shape = (A.shape[0] // size, A.shape[1] // size, size)
+        failed = getattr(mkl, f"mkl_sparse_{letter}_create_bsr")(ctypes.byref(handle), 0, _ROWS, *shape, *arrays)
     return None if failed else handle
