@@ -18,7 +18,12 @@ from contactopt.bodies.solvers.constants import LEAF
 
 
 def elimination_order(
-    A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, points: np.ndarray, last: np.ndarray
+    A: sp.csr_matrix,
+    node: np.ndarray,
+    component: np.ndarray,
+    points: np.ndarray,
+    last: np.ndarray,
+    by_degree: bool | None = None,
 ) -> np.ndarray:
     """Order of elimination with few entries in the factors and some unknowns at the end.
 
@@ -28,6 +33,7 @@ def elimination_order(
     node, component : (n,) mesh node of each unknown, and its component of the displacement
     points : (dim, nodes) coordinates of the mesh nodes [length]
     last : (m,) unknowns to be eliminated last; may be empty
+    by_degree : minimum degree rather than nested dissection; None: in the plane
 
     Returns
     -------
@@ -38,7 +44,7 @@ def elimination_order(
     kept = np.zeros(len(present), dtype=bool)  # nodes with an unknown in `last`
     kept[own[last]] = True
     rank = np.full(len(present), len(present))
-    if len(points) == 2:
+    if len(points) == 2 if by_degree is None else by_degree:
         rank[minimum_degree(graph + _clique(kept))] = np.arange(len(present))
     else:
         inside = np.flatnonzero(~kept)

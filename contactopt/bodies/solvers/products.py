@@ -1,7 +1,7 @@
 """Products of a sparse matrix with a vector, by oneMKL where pypardiso has installed it and by SciPy elsewhere.
 
-One oneMKL product of single precision is several times faster than SciPy's (`python -m experiments.body_solvers
---products`). Neither holds Python's lock.
+One oneMKL product of single precision is faster than one of SciPy (`python -m experiments.solver_constants`).
+Neither holds Python's lock.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ class FactorThread:
 
     def factorise(self, A: sp.csc_matrix) -> int:
         """Factorise A without a change of order and return the number under which [] finds the factors."""
-        self._held.append(self._executor.submit(_factors, A).result())
+        self._held.append(self._executor.submit(factorise, A).result())
         return len(self._held) - 1
 
     def __getitem__(self, number: int) -> Any:
@@ -49,7 +49,8 @@ def _free(executor: ThreadPoolExecutor, held: list[Any]) -> None:
     executor.shutdown(wait=False)
 
 
-def _factors(A: sp.csc_matrix) -> Any:
+def factorise(A: sp.csc_matrix) -> Any:
+    """SciPy's SuperLU object of a symmetric positive definite matrix, eliminated in its own order, without pivoting."""
     return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
