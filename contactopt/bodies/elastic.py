@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from contactopt.bodies.body import Assembly, build_body, reload_body
 from contactopt.bodies.fields import Fields, fields_of
 from contactopt.bodies.protocol import Mesh, Product, Surface
-from contactopt.bodies.solvers import choose, make_solver
+from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Part, Scene
@@ -60,15 +60,15 @@ class ElasticBody:
 
     @property
     def iterative(self) -> bool:
-        return self.solver.name == "multigrid"
+        return self.solver.iterative
 
     @property
     def complete(self) -> bool:
-        return self.solver.last is not None
+        return self.solver.complete
 
     @property
     def parallel(self) -> bool:
-        return self.solver.name != "superlu"  # which keeps Python's lock
+        return self.solver.releases_lock
 
     @property
     def interface_compliance(self) -> np.ndarray:
@@ -154,8 +154,7 @@ class AssembledElastic:
         return self.body.contact_dofs.size
 
     def iterates(self, solver: str) -> bool:
-        chosen = choose(self.unknowns, len(self.body.unknowns)) if solver == "auto" else solver
-        return chosen == "multigrid"
+        return solver_type(solver, self.unknowns, len(self.body.unknowns)).iterative
 
     def surface(self, name: str | None = None) -> Surface:
         """The contact surface, with the places of its nodes on the curve that the part gives."""

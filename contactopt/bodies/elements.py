@@ -17,9 +17,11 @@ methods for 3D finite deformation contact, SIAM J. Sci. Comput. 34, B421-B446.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
+from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -78,7 +80,38 @@ def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellB
     element = SHAPES[mesh.refdom.__name__][1][degree]()
     simplex = mesh.refdom.__name__ in ("RefTri", "RefTet") and not is_curved(mesh)
     order = 2 if simplex and not axisymmetric else 2 * degree + axisymmetric
-    return skfem.Basis(mesh, skfem.ElementVector(element), intorder=order)
+    return LeanBasis(mesh, skfem.ElementVector(element), order)
+
+
+class LeanBasis(skfem.CellBasis):
+    """A CellBasis that evaluates a shape function whenever it is asked for, for all of them take more than the stiffness.
+
+    Arguments: mesh, element and order of the quadrature.
+    """
+
+    def __init__(self, mesh: skfem.Mesh, element: skfem.Element, order: int):
+        super(skfem.CellBasis, self).__init__(mesh, element, intorder=order, refdom=mesh.refdom)
+        self.tind, self.nelems = None, mesh.nelements
+        self.dx = np.abs(self.mapping.detDF(self.X)) * np.broadcast_to(self.W, (self.nelems, len(self.W)))
+        self.basis = _Shapes(element, self.mapping, self.X, self.Nbfun)
+
+
+@dataclass(frozen=True)
+class _Shapes(Sequence[Any]):
+    """Shape functions of all elements at the quadrature points, evaluated one by one."""
+
+    element: skfem.Element
+    mapping: skfem.mapping.Mapping
+    points: np.ndarray
+    functions: int
+
+    def __len__(self) -> int:
+        return self.functions
+
+    def __getitem__(self, number: Any) -> Any:
+        if not -self.functions <= number < self.functions:
+            raise IndexError(number)
+        return self.element.gbasis(self.mapping, self.points, number % self.functions)
 
 
 def is_curved(mesh: skfem.Mesh) -> bool:

@@ -1,14 +1,15 @@
-"""The linear system A x = b of one elastic body behind one seam: sparse factors (contactopt.bodies.solvers.system) or multigrid.
+"""The linear system A x = b of one elastic body: sparse factors or multigrid, behind one protocol (BodySolver).
 
-A is the stiffness on the free displacement unknowns, symmetric positive definite. Every solver is made by a function
-of SOLVERS from a System.
+A solver is a class in a module of its own and a line of SOLVERS. It is made from a contactopt.bodies.solvers.system.System.
 """
 
 from __future__ import annotations
 
+import logging
 from importlib import import_module
 from importlib.util import find_spec
 
+from contactopt.bodies.solvers.constants import FACTORS_UP_TO, PARDISO_FROM
 from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.errors import InputError
 
@@ -22,32 +23,49 @@ SOLVERS = {
         "conjugate gradients with a V-cycle of smoothed aggregation (pyamg)",
     ),
 }
-SMALL = 20_000  # unknowns of a 3D body for which PARDISO is not worth its start
-LARGEST = {"superlu": 100_000, "pardiso": 200_000}  # unknowns of a 3D body that is factorised
 
 
 def make_solver(name: str, system: System) -> BodySolver:
-    """The solver `name`, a key of SOLVERS or 'auto', of a body.
+    """The solver of a body.
 
-    Raises InputError for an unknown name or a missing package.
+    Parameters
+    ----------
+    name : a key of SOLVERS, or 'auto' for the cheapest one (see choose)
+    system : the linear system of the body
+
+    Raises
+    ------
+    InputError : for a name that is not in the table, or a package that is not installed.
     """
-    if name == "auto":
-        name = choose(system.A.shape[0], len(system.points), find_spec("pypardiso") is not None)
-    if name not in SOLVERS:
-        raise InputError(f"unknown body solver {name!r}; choose from auto, {', '.join(SOLVERS)}.")
-    module, cls, _ = SOLVERS[name]
-    made: BodySolver = getattr(import_module(module), cls)(system)
+    n, dim = system.A.shape[0], len(system.points)
+    kind = solver_type(name, n, dim)
+    logging.getLogger(__name__).info("body of %d unknowns in %dD: solver %s", n, dim, kind.name)
+    made: BodySolver = kind(system)  # type: ignore[call-arg]
     return made
 
 
-def choose(n: int, dim: int, pardiso: bool = False) -> str:
-    """The cheapest solver for n unknowns in `dim` dimensions; `pardiso` only where it is installed.
+def solver_type(name: str, n: int, dim: int) -> type[BodySolver]:
+    """The class of the solver that make_solver would make for n unknowns in `dim` dimensions.
 
-    Factors in an order of nested dissection have about n log n entries in 2D, 45 n^(4/3) in 3D, and take n^(3/2) and n^2
-    operations; the work of multigrid and its memory grow with n. At LARGEST in 3D the factors take 2 GB, and those of
-    SuperLU as long to make as some 20 solves by multigrid (reports/body_solvers). PARDISO takes a second to start.
+    Its attributes `iterative` and `releases_lock` are known before there is a matrix. Raises InputError for a name that
+    is not in SOLVERS.
     """
-    if dim == 2 or n <= SMALL:
+    if name == "auto":
+        name = choose(n, dim, find_spec("pypardiso") is not None)
+    if name not in SOLVERS:
+        raise InputError(f"unknown body solver {name!r}; choose from auto, {', '.join(SOLVERS)}.")
+    module, cls, _ = SOLVERS[name]
+    kind: type[BodySolver] = getattr(import_module(module), cls)
+    return kind
+
+
+def choose(n: int, dim: int, pardiso: bool = False) -> str:
+    """Name of the cheapest solver for n unknowns in `dim` dimensions; `pardiso` says whether it is installed.
+
+    Sparse factors have about n log n entries in the plane and n^(4/3) in space, and take n^(3/2) and n^2 operations. The
+    work and the memory of multigrid grow with n. The limits stand in contactopt.bodies.solvers.constants.
+    """
+    if dim == 2 or n <= PARDISO_FROM:
         return "superlu"
     factors = "pardiso" if pardiso else "superlu"
-    return factors if n <= LARGEST[factors] else "multigrid"
+    return factors if n <= FACTORS_UP_TO[factors] else "multigrid"

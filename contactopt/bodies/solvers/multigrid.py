@@ -1,9 +1,12 @@
-"""A V-cycle of smoothed aggregation for the stiffness of an elastic body, whose near-kernel are the rigid motions.
+"""Multigrid by smoothed aggregation for the stiffness of an elastic body, whose near-kernel are the rigid motions.
 
 Meshes that are graded away from a contact have flat elements, and nodes far along their long sides hardly know of each
 other. Only nodes close to each other in the measure of the mesh around them are aggregated, so that such elements are
 coarsened along their short sides first. Every level is scaled to a unit diagonal and smoothed by Chebyshev polynomials
 of the fourth kind, that is by products with sparse matrices, which leave Python's lock to other threads.
+
+The V-cycle works in single precision: it only has to come close to the inverse, and its time is the time to read its
+matrices. The conjugate gradients around it work in double precision with the matrix of the body itself.
 
 Sources: Vanek, Mandel, Brezina (1996), Algebraic multigrid by smoothed aggregation for second and fourth order elliptic
 problems; Lottes (2023), Optimal polynomial smoothers for multigrid V-cycles.
@@ -12,12 +15,15 @@ problems; Lottes (2023), Optimal polynomial smoothers for multigrid V-cycles.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-from scipy.sparse.linalg import eigsh
+from scipy.sparse.linalg import LinearOperator, eigsh
 
+from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST, NEAR, RTOL
+from contactopt.bodies.solvers.products import SparseProduct
 from contactopt.bodies.solvers.system import (
     Product,
     System,
@@ -28,130 +34,172 @@ from contactopt.bodies.solvers.system import (
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
 
-MOST = 300  # conjugate gradient iterations
-COARSEST = 60  # nodes or aggregates that are not coarsened further
-NEAR = 1.5  # neighbours at up to this multiple of the least distance are aggregated
-DEGREE = 3  # of the smoothing polynomial
-RTOL = 1e-10  # default accuracy of an iterative solve
+SINGLE = np.float32
+PIECES = 16  # in which the rows of a matrix are brought into blocks
 
 
 class MultigridSolver:
-    """Conjugate gradients preconditioned by contactopt.bodies.solvers.multigrid (pip install pyamg).
+    """Conjugate gradients preconditioned by a V-cycle (VCycle), which needs the package pyamg.
 
-    solve() ends where (r' B r)^1/2, r the residual and B the V-cycle, has fallen by `rtol`: an estimate of the error in
-    the energy norm, relative to the solution's. BackendError if it does not get there.
+    A solve ends where (r' B r)^1/2, r the residual and B the V-cycle, has fallen by `rtol`. This estimates the error in
+    the energy norm, relative to that of the solution. It raises BackendError if it does not get there.
+
+    A      products with the (n, n) matrix in double precision
+    cycle  the VCycle
     """
 
     name = "multigrid"
+    iterative = True
+    releases_lock = True
 
     def __init__(self, system: System):
-        self.last = system.last
-        self.iterations = 0
+        self.last, self.n = system.last, system.A.shape[0]
+        self.A = SparseProduct(system.A)
         self.cycle = VCycle(*system[:4])
+
+    @property
+    def complete(self) -> bool:
+        return self.last is not None
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         rtol = RTOL if rtol is None else rtol
         check_number("rtol", rtol, low=0.0, high=1.0)
-        columns = load.reshape(len(load), -1)
-        out = np.zeros(columns.shape)
-        self.iterations = 0
-        for b, x in zip(columns.T, out.T):
-            answer, steps = conjugate_gradients(self.cycle, self.cycle.scale * b, rtol)
-            x[:] = self.cycle.scale * answer
-            self.iterations = max(self.iterations, steps)
-        return out.reshape(load.shape)
+        out = np.zeros(load.shape)
+        for b, x in zip(load.reshape(self.n, -1).T, out.reshape(self.n, -1).T):
+            x[:] = conjugate_gradients(self.A, self.cycle, b, rtol).x
+        return out
 
     def trailing_inverse(self) -> np.ndarray:
-        return inverse_block(self, len(self.cycle.scale))
+        return inverse_block(self, asked(self.last), self.n)
 
     def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        return block_product(self, asked(self.last), len(self.cycle.scale), load, rtol)
+        return block_product(self, asked(self.last), self.n, load, rtol)
 
     def restricted(self, at: np.ndarray) -> Product:
-        return lambda load, rtol: block_product(self, at, len(self.cycle.scale), load, rtol)
+        return lambda load, rtol: block_product(self, at, self.n, load, rtol)
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A (n, n) scaled to a unit diagonal, its largest eigenvalue, and the prolongation P (n, coarse n) to it."""
+    """One level of the hierarchy, in single precision.
 
-    A: sp.csr_matrix
-    largest: float
+    A        products with the (n, n) matrix, scaled to a unit diagonal
+    largest  a little more than the largest eigenvalue of A
+    P, R     prolongation (n, coarse n) from the next level, and its transpose
+    """
+
+    A: SparseProduct
+    largest: np.floating
     P: sp.csr_matrix
+    R: sp.csr_matrix
 
     def smooth(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x = p(A) r close to A^-1 r for the upper eigenvalues, p of degree DEGREE - 1; r - A x = r' - A z: x, r', z."""
-        z = 4 / (3 * self.largest) * r
+        z = SINGLE(4 / 3) / self.largest * r
         x = z.copy()
         for k in range(2, DEGREE + 1):
             r = r - self.A @ z
-            z = (2 * k - 3) / (2 * k + 1) * z + (8 * k - 4) / ((2 * k + 1) * self.largest) * r
+            z = SINGLE((2 * k - 3) / (2 * k + 1)) * z + SINGLE((8 * k - 4) / (2 * k + 1)) / self.largest * r
             x += z
         return x, r, z
 
 
 class VCycle:
-    """B, symmetric positive definite and spectrally close to the inverse of the scaled matrix.
+    """B, symmetric positive definite up to single precision and spectrally close to the inverse of A.
 
-    scale    (n,) s = diag(A)^-1/2;   A  (n, n) the scaled diag(s) A diag(s)
-    levels   finest first;   coarsest  the inverse of the last level's matrix
+    place     (n,) of each unknown among those of all nodes present, nodes one after the other; held unknowns have a
+              place too, and a row of their own that nothing else touches
+    scale     (n,) diag(A)^-1/2
+    levels    finest first;   coarsest  the inverse of the last level's matrix
+
     Arguments as in contactopt.bodies.solvers.system.System. Raises InputError if the package pyamg is missing.
     """
 
     def __init__(self, A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, points: np.ndarray):
-        self.scale = scale = _inverse_root(A.diagonal())
-        self.A = _scaled(A, scale)
+        blocks, self.place, present = nodal_blocks(A, node, component, len(points))
+        self.scale = _inverse_root(A.diagonal())
+        self.size = blocks.shape[0]
         self.levels: list[Level] = []
-        blocks, place, present = nodal_blocks(A, node, component, len(points))
         points, modes = points[:, present], rigid_motions(points[:, present])
-        modes[np.setdiff1d(np.arange(len(modes)), place)] = 0.0
-        level = self.A
+        modes[np.setdiff1d(np.arange(self.size), self.place)] = 0.0
+        scale = _inverse_root(blocks.diagonal())
         while points.shape[1] > COARSEST:
+            level = SparseProduct(_scaled(blocks, scale, scale))
             P, modes, points = coarsen(blocks, modes, points)
-            blocks = P.T @ blocks @ P
-            rows = P.tocsr() if self.levels else P.tocsr()[place]
+            blocks = sp.bsr_matrix(P.T @ (blocks @ P))
             coarse = _inverse_root(blocks.diagonal())
-            inverse = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
-            self.levels.append(Level(level, largest_eigenvalue(level), _scaled(rows, inverse, coarse)))
-            level, scale = _scaled(blocks.tocsr(), coarse), coarse
-        self.coarsest = la.pinvh(level.toarray(), rtol=1e-12)
+            P = _scaled(P, np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0), coarse).tocsr()
+            self.levels.append(Level(level, SINGLE(largest_eigenvalue(level)), P, P.T.tocsr()))
+            scale = coarse
+        dense = blocks.toarray() * scale * scale[:, None]
+        self.coarsest = la.pinvh(dense, rtol=1e-12).astype(SINGLE)
 
-    def apply(self, r: np.ndarray, depth: int = 0) -> np.ndarray:
-        """B r on the levels from `depth` on: smooth, correct on the next level, smooth."""
+    def apply(self, r: np.ndarray) -> np.ndarray:
+        """B r: one V-cycle for the residual r (n,), in the units of A.
+
+        The residual is divided by its largest entry, for single precision has small exponents only.
+        """
+        size = float(np.abs(r).max(initial=0.0))
+        if size == 0.0:
+            return np.zeros(len(r))
+        full = np.zeros(self.size, dtype=SINGLE)
+        full[self.place] = self.scale * r / size
+        return self.scale * size * self._correct(full, 0)[self.place]
+
+    def _correct(self, r: np.ndarray, depth: int) -> np.ndarray:
+        """Approximate solution on the levels from `depth` on: smooth, correct on the next level, smooth."""
         if depth == len(self.levels):
             return np.asarray(self.coarsest @ r)
         level = self.levels[depth]
         x, r, z = level.smooth(r)
         r = r - level.A @ z
-        correction = level.P @ self.apply(level.P.T @ r, depth + 1)
+        correction = level.P @ self._correct(level.R @ r, depth + 1)
         return np.asarray(x + correction + level.smooth(r - level.A @ correction)[0])
 
     @property
     def complexity(self) -> float:
         """Entries of the matrices of all levels over those of the finest."""
-        return sum(level.A.nnz for level in self.levels) / self.A.nnz if self.levels else 1.0
+        entries = [level.A.matrix.nnz for level in self.levels]
+        return sum(entries) / entries[0] if entries else 1.0
 
 
-def conjugate_gradients(cycle: VCycle, r: np.ndarray, rtol: float) -> tuple[np.ndarray, int]:
-    """Solution of the scaled system for the right-hand side r (n,), and the number of iterations.
+class Answer(NamedTuple):
+    """Solution x (n,) of a linear system and the number of V-cycles that it took."""
 
-    Ends where (r' B r)^1/2, r the residual, has fallen by rtol; BackendError if it does not within MOST iterations.
+    x: np.ndarray
+    cycles: int
+
+
+def conjugate_gradients(A: SparseProduct, cycle: VCycle, load: np.ndarray, rtol: float) -> Answer:
+    """Solution of A x = load by conjugate gradients with a V-cycle.
+
+    It ends where (r' B r)^1/2, r the residual, has fallen by `rtol`.
+
+    Raises
+    ------
+    BackendError : if it does not get there within MOST iterations, or r' B r is negative or not a number.
     """
+    r = np.array(load, dtype=float)
     x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
     for step in range(MOST + 1):
         z = cycle.apply(r)
-        size, previous = float(r @ z), size
+        size, previous = _dot(r, z), size
         goal = rtol**2 * size if goal is None else goal
-        if size <= goal:
-            return x, step
-        if not np.isfinite(size):
-            break
+        if 0 <= size <= goal:
+            return Answer(x, step)
+        if not 0 < size < np.inf:
+            raise BackendError("multigrid: the V-cycle is not positive definite here; take a solver with factors.")
         p = z + (size / previous) * p
-        Ap = cycle.A @ p
-        alpha = size / float(p @ Ap)
+        Ap = A @ p
+        alpha = size / _dot(p, Ap)
         x += alpha * p
-        r = r - alpha * Ap
+        r -= alpha * Ap
     raise BackendError(f"multigrid: the error was not reduced by {rtol:g} within {MOST} iterations.")
+
+
+def _dot(x: np.ndarray, y: np.ndarray) -> float:
+    """x' y without BLAS, whose threads would spin until the next call."""
+    return float(np.einsum("i,i", x, y))
 
 
 def coarsen(A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
@@ -205,23 +253,39 @@ def rigid_motions(points: np.ndarray) -> np.ndarray:
     return np.stack([c.T.ravel() for c in columns], axis=1)
 
 
-def largest_eigenvalue(A: sp.csr_matrix) -> float:
+def largest_eigenvalue(A: SparseProduct) -> float:
     """A little more than the largest eigenvalue of a symmetric matrix, by Lanczos' method."""
-    start = np.random.default_rng(0).standard_normal(A.shape[0])
-    return 1.02 * float(eigsh(A, 1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0])
+    n = A.matrix.shape[0]
+    start = np.random.default_rng(0).standard_normal(n).astype(A.matrix.dtype)
+    operator = LinearOperator((n, n), matvec=lambda x: A @ x.ravel(), dtype=A.matrix.dtype)
+    return 1.02 * float(eigsh(operator, 1, which="LA", v0=start, tol=1e-2, return_eigenvectors=False)[0])
 
 
 def nodal_blocks(
     A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """A in blocks of nodes, the place of each unknown there, the nodes present; held unknowns are rows of their own."""
+    """A in blocks of nodes; its rows are made some at a time, for the copies take more than the result.
+
+    Returns
+    -------
+    The (k dim, k dim) matrix of the k nodes present, whose held unknowns are rows of their own; the place (n,) of each
+    unknown of A in it; and the nodes present (k,).
+    """
     present, own = np.unique(node, return_inverse=True)
-    place = own * dim + component
-    size = len(present) * dim
+    place, size = own * dim + component, len(present) * dim
     spread = sp.csr_matrix((np.ones(len(own)), (place, np.arange(len(own)))), (size, len(own)))
     held = np.full(size, np.median(A.diagonal()))
     held[place] = 0.0
-    return (spread @ A @ spread.T + sp.diags(held)).tobsr((dim, dim)), place, present
+    own_rows, pieces = sp.csr_matrix(sp.diags(held)), []
+    for rows in np.array_split(np.arange(size).reshape(-1, dim), PIECES):
+        first, stop = rows.size and rows[0, 0], rows.size and rows[-1, -1] + 1
+        chosen = sp.csr_matrix(spread[first:stop] @ A)
+        wide = sp.csr_matrix((chosen.data, place[chosen.indices], chosen.indptr), (stop - first, size))
+        pieces.append((wide + own_rows[first:stop]).tobsr((dim, dim)))
+    indptr = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(piece.indptr) for piece in pieces]))])
+    indices = np.concatenate([piece.indices for piece in pieces]).astype(np.int32)
+    data = np.concatenate([piece.data for piece in pieces])
+    return sp.bsr_matrix((data, indices, indptr.astype(np.int32)), (size, size)), place, present
 
 
 def _inverse_root(diagonal: np.ndarray) -> np.ndarray:
@@ -230,8 +294,11 @@ def _inverse_root(diagonal: np.ndarray) -> np.ndarray:
     return np.divide(1.0, np.sqrt(diagonal, where=there, out=np.ones_like(diagonal)), where=there, out=0 * diagonal)
 
 
-def _scaled(A: sp.csr_matrix, rows: np.ndarray, columns: np.ndarray | None = None) -> sp.csr_matrix:
-    """diag(rows) A diag(columns), columns = rows if None."""
-    values = A.data * (rows if columns is None else columns)[A.indices]
-    values *= np.repeat(rows, np.diff(A.indptr))
-    return sp.csr_matrix((values, A.indices, A.indptr), A.shape)
+def _scaled(A: sp.bsr_matrix, rows: np.ndarray, columns: np.ndarray) -> sp.bsr_matrix:
+    """diag(rows) A diag(columns) in single precision."""
+    height, width = A.blocksize
+    of_block = np.repeat(np.arange(A.shape[0] // height), np.diff(A.indptr))
+    values = A.data.astype(SINGLE)
+    values *= rows.astype(SINGLE).reshape(-1, height, 1)[of_block]
+    values *= columns.astype(SINGLE).reshape(-1, 1, width)[A.indices]
+    return sp.bsr_matrix((values, A.indices, A.indptr), A.shape)

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.bodies.solvers.mkl import library
 from contactopt.bodies.solvers.system import (
     Product,
     System,
@@ -23,18 +24,24 @@ class PardisoSolver:
     """Cholesky factors of Intel's oneMKL PARDISO in its own nested dissection order (pip install pypardiso)."""
 
     name = "pardiso"
-    iterations = 0
+    iterative = False
+    releases_lock = True
 
     def __init__(self, system: System):
         try:
             from pypardiso import PyPardisoSolver
         except ImportError as error:
             raise InputError("the body solver 'pardiso' needs the package pypardiso: pip install pypardiso.") from error
+        library()  # so that pypardiso need not search for it
         self.last = system.last
         self.upper = sp.triu(system.A, format="csr")
         self.factors = PyPardisoSolver(mtype=2)  # real, symmetric positive definite
         self.factors.factorize(self.upper)
         weakref.finalize(self, self.factors.free_memory, everything=True)  # MKL's memory is not Python's
+
+    @property
+    def complete(self) -> bool:
+        return self.last is not None
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         if not load.size:
@@ -43,7 +50,10 @@ class PardisoSolver:
 
     @cached_property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray]:
-        """As SuperLUSolver's; from a factorisation that ends at the Schur complement."""
+        """R (m, m) lower triangular and the place (m,) of each of `last`: R R' is the Schur complement in these places.
+
+        A second factorisation, which stops before these unknowns, leaves the Schur complement.
+        """
         from pypardiso import PyPardisoSolver
 
         last, n = asked(self.last), self.upper.shape[0]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import weakref
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, cached_property
-from itertools import count
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,30 +23,64 @@ from contactopt.bodies.solvers.system import (
 )
 
 
+class FactorThread:
+    """One thread that makes factors and frees them: SuperLU returns memory only in the thread that took it.
+
+    The thread ends, and its factors are freed, when nobody refers to this object any more.
+    """
+
+    def __init__(self) -> None:
+        self._executor = ThreadPoolExecutor(1, thread_name_prefix="superlu")
+        self._held: list[Any] = []
+        weakref.finalize(self, _free, self._executor, self._held).atexit = False
+
+    def factorise(self, A: sp.csc_matrix) -> int:
+        """Factorise A without a change of order and return the number under which [] finds the factors."""
+        self._held.append(self._executor.submit(factorise, A).result())
+        return len(self._held) - 1
+
+    def __getitem__(self, number: int) -> Any:
+        """SciPy's SuperLU object. Whoever keeps it longer than this thread keeps its memory for good."""
+        return self._held[number]
+
+
+def _free(executor: ThreadPoolExecutor, held: list[Any]) -> None:
+    executor.submit(held.clear)
+    executor.shutdown(wait=False)
+
+
+def factorise(A: sp.csc_matrix) -> Any:
+    """SciPy's SuperLU object of a symmetric positive definite matrix, eliminated in its own order, without pivoting."""
+    return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+
+
 class SuperLUSolver:
-    """Factors of A in an order of nested dissection, `last` eliminated last: their triangles give its Schur complement."""
+    """Factors L U = L D L' of A, with `last` eliminated last: their last rows and columns give its Schur complement."""
 
     name = "superlu"
-    iterations = 0
+    iterative = False
+    releases_lock = False
 
     def __init__(self, system: System):
-        self.last, self.plane = system.last, len(system.points) == 2
+        self.last, self._plane = system.last, len(system.points) == 2
         last = np.zeros(0, int) if system.last is None else system.last
-        self.order = elimination_order(*system[:4], last)
-        ordered = system.A[self.order][:, self.order].tocsc()
-        self._home = _homes()[next(_TURN) % 2]
-        self._held = [self._home.submit(_factors, ordered).result()]
-        weakref.finalize(self, self._home.submit, self._held.clear).atexit = False
+        self._order = elimination_order(*system[:4], last)
+        self._thread = FactorThread()
+        self._thread.factorise(system.A[self._order][:, self._order].tocsc())
+
+    @property
+    def complete(self) -> bool:
+        return self.last is not None
 
     @property
     def factors(self) -> Any:
-        """SciPy's SuperLU object."""
-        return self._held[0]
+        """SciPy's SuperLU object of the permuted matrix."""
+        return self._thread[0]
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         out = np.zeros(load.shape)
         if load.size:
-            out[self.order] = self.factors.solve(np.ascontiguousarray(load[self.order]))
+            out[self._order] = self.factors.solve(np.ascontiguousarray(load[self._order]))
         return out
 
     @cached_property
@@ -67,51 +100,38 @@ class SuperLUSolver:
 
     def trailing_inverse(self) -> np.ndarray:
         if self.trailing_triangle is None:
-            return inverse_block(self, len(self.order))
+            return inverse_block(self, asked(self.last), len(self._order))
         return triangle_inverse(*self.trailing_triangle)
 
     def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         """Two triangular solves with the trailing triangle: nothing of the interior is touched."""
         if self.trailing_triangle is None:
-            return block_product(self, asked(self.last), len(self.order), load, rtol)
+            return block_product(self, asked(self.last), len(self._order), load, rtol)
         return triangle_product(*self.trailing_triangle, load)
 
     def restricted(self, at: np.ndarray) -> Product:
-        """By the part of L D L' that a load on `at` reaches: these unknowns and their ancestors in the elimination tree.
+        """Products that use only the rows and columns of L and D that a load on `at` reaches.
 
-        In the plane few separators touch the contact; in 3D those that do hold most of the entries, and to copy them costs
-        more than it saves.
+        These are the unknowns of `at` and their ancestors in the elimination tree. In the plane they are few. In space
+        they hold most of the entries of L, and a copy of them costs more than it saves, so that whole solves are used.
         """
-        factors, n = self.factors, len(self.order)
-        if not self.plane or not np.array_equal(factors.perm_c, factors.perm_r):
+        factors, n = self.factors, len(self._order)
+        if not self._plane or not np.array_equal(factors.perm_c, factors.perm_r):
             return lambda load, rtol: block_product(self, at, n, load, rtol)
         place = np.empty(n, int)
-        place[self.order] = np.arange(n)
+        place[self._order] = np.arange(n)
         first, L = factors.perm_c[place[at]], factors.L
         reached = _ancestors(L, first)
-        inside, pivots, mine = np.searchsorted(reached, first), factors.U.diagonal()[reached], len(self._held)
-        self._held.append(self._home.submit(_factors, L[:, reached][reached].tocsc()).result())
+        inside, pivots = np.searchsorted(reached, first), factors.U.diagonal()[reached]
+        thread, mine = self._thread, self._thread.factorise(L[:, reached][reached].tocsc())
 
         def product(load: np.ndarray, rtol: float | None) -> np.ndarray:
             x = np.zeros((len(reached), *load.shape[1:]))
             x[inside] = load
-            x = self._held[mine].solve(x)
-            return np.asarray(self._held[mine].solve((x.T / pivots).T, "T")[inside])
+            x = thread[mine].solve(x)  # L y = x
+            return np.asarray(thread[mine].solve((x.T / pivots).T, "T")[inside])  # L' x = y / D
 
         return product
-
-
-_TURN = count()
-
-
-@cache
-def _homes() -> tuple[ThreadPoolExecutor, ThreadPoolExecutor]:
-    """Two threads that make and free factors: SuperLU frees its memory only in the thread that took it."""
-    return ThreadPoolExecutor(1), ThreadPoolExecutor(1)
-
-
-def _factors(A: sp.csc_matrix) -> Any:
-    return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def _ancestors(L: sp.csc_matrix, first: np.ndarray) -> np.ndarray:

@@ -13,11 +13,11 @@ from contactopt.errors import InputError
 
 
 class System(NamedTuple):
-    """What the solvers of one body are made from.
+    """What the solvers of one body are made from. The matrix is not copied and must not change afterwards.
 
-    A          (n, n) sparse [force / length]
+    A          (n, n) stiffness on the free displacement unknowns, symmetric positive definite [force / length]
     node       (n,) mesh node of each unknown;   component  (n,) its component, 0 .. dim - 1
-    points     (dim, nodes) coordinates of the mesh nodes
+    points     (dim, nodes) coordinates of the mesh nodes [length]
     last       (m,) unknowns whose block of the inverse is asked for (the contact unknowns), or None
     """
 
@@ -32,51 +32,75 @@ Product = Callable[[np.ndarray, float | None], np.ndarray]
 
 
 class BodySolver(Protocol):
-    """Solves A x = b. Different solvers may work in different threads; one solver serves one thread at a time.
+    """Solves A x = b. Several solvers may work at the same time in different threads.
 
-    name        its name in SOLVERS
-    last        unknowns whose block of the inverse can be asked for, or None
-    iterations  conjugate gradient iterations of the last call of `solve`, the most of any column; 0 for factors
+    name           its name in contactopt.bodies.solvers.SOLVERS, for messages and records only
+    iterative      whether a lower accuracy costs less; the others ignore `rtol` and solve to rounding
+    releases_lock  whether a solve leaves Python's lock to other threads, so that two solvers at once are faster than
+                   one after the other
+    complete       whether the block of the inverse on System.last was provided for
     """
 
     name: str
-    last: np.ndarray | None
-    iterations: int
+    iterative: bool
+    releases_lock: bool
+
+    @property
+    def complete(self) -> bool: ...
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        """A^-1 load; load (n,) or (n, j). `rtol` (None: 1e-10) bounds an iterative solver's error, see there."""
+        """Solution of A x = load.
+
+        Parameters
+        ----------
+        load : (n,) or (n, j) forces
+        rtol : error in the energy norm, relative to that of the solution, at which an iterative solver may stop;
+            None stands for contactopt.bodies.solvers.constants.RTOL
+
+        Returns
+        -------
+        Displacements of the shape of `load`.
+        """
 
     def trailing_inverse(self) -> np.ndarray:
-        """The block of A^-1 on the unknowns `last`, in their order, (m, m) symmetric; InputError without `last`."""
+        """(m, m) symmetric block of the inverse of A on the unknowns `last`; InputError if it is not complete."""
 
     def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        """That block times `load`, (m,) or (m, j)."""
+        """That block times `load`, which is (m,) or (m, j)."""
 
     def restricted(self, at: np.ndarray) -> Product:
-        """Products with the block of A^-1 on the unknowns `at` (m,): load (m,) or (m, j), rtol -> as load."""
+        """Products with the block of the inverse of A on the unknowns `at` (m,), as a function (load, rtol) -> product.
+
+        The function takes loads of shape (m,) or (m, j).
+        """
 
 
 def asked(last: np.ndarray | None) -> np.ndarray:
+    """`last`; InputError if it is None."""
     if last is None:
         raise InputError("no unknowns were named whose block of the inverse is asked for; give `last`.")
     return last
 
 
 def triangle_inverse(R: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Inverse of R R', (m, m). Its row and column place[i] become row and column i.
+
+    R is (m, m) lower triangular, place (m,) a permutation.
+    """
     X = la.solve_triangular(R, np.eye(len(R)), lower=True, check_finite=False)
     C = X.T @ X  # NumPy keeps it symmetric
     return np.asarray(C[np.ix_(place, place)])
 
 
 def triangle_product(R: np.ndarray, place: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """triangle_inverse(R, place) @ load, by two substitutions; load is (m,) or (m, j)."""
     x = np.empty(load.shape)
     x[place] = load
     return np.asarray(la.cho_solve((R, True), x, check_finite=False))[place]
 
 
-def inverse_block(solver: Any, n: int, columns: int = 64) -> np.ndarray:
-    """The block of the inverse on solver.last by solves with unit loads, some columns at a time."""
-    last = asked(solver.last)
+def inverse_block(solver: Any, last: np.ndarray, n: int, columns: int = 64) -> np.ndarray:
+    """The block of the inverse on the unknowns `last` of n, by solves with unit loads, some columns at a time."""
     C = np.empty((len(last), len(last)))
     for start in range(0, len(last), columns):
         chosen = last[start : start + columns]
@@ -87,7 +111,7 @@ def inverse_block(solver: Any, n: int, columns: int = 64) -> np.ndarray:
 
 
 def block_product(solver: Any, at: np.ndarray, n: int, load: np.ndarray, rtol: float | None) -> np.ndarray:
-    """The block of the inverse on `at` times load (m,) or (m, j), by a solve."""
+    """The block of the inverse on the unknowns `at` of n, times load (m,) or (m, j), by one solve."""
     full = np.zeros((n, *load.shape[1:]))
     full[at] = load
     return np.asarray(solver.solve(full, rtol)[at])
