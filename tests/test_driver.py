@@ -8,6 +8,7 @@ from conftest import one_contact
 from contactopt import InputError, InterfaceProblem, Status, natural_map_residual, solve
 from contactopt.benchmark.problems import rigid_bodies
 from contactopt.problem.operators import InterfaceOperator
+from contactopt.solving.deadline import check_time
 from contactopt.solving.methods import METHODS
 
 
@@ -41,6 +42,30 @@ def test_limits_are_kept_and_the_last_iterate_survives():
     assert solution.reactions[0, 0] == pytest.approx(WRONG[6][0] * FORCE)
     slow = solve(PROBLEM, Scripted(WRONG, pause=0.02), time_limit=0.05)
     assert slow.status is Status.TIME_LIMIT and slow.iterations < 10
+
+
+@dataclass(frozen=True)
+class Endless:
+    """A method whose first outer iteration never ends by itself."""
+
+    def iterate(self, problem, start=None):
+        while problem.contacts:
+            check_time()
+        yield
+
+
+def test_the_time_limit_ends_inner_iterations():
+    solution = solve(PROBLEM, Endless(), time_limit=0.1)
+    assert solution.status is Status.TIME_LIMIT and solution.iterations == 0 and solution.seconds["solve"] > 0.1
+
+
+@pytest.mark.parametrize("method", ["apg", "lagrangian"])
+def test_a_load_that_nothing_balances_does_not_outlast_the_time_limit(method):
+    """Contact pushes upwards only, and the second plate is drawn along the contacts, which carry no friction."""
+    rng = np.random.default_rng(3)
+    problem = InterfaceProblem(np.eye(6), rng.normal(size=(2, 3)), 1e-3, rng.normal(size=(6, 3)), [1.0, -1.0, 1.0])
+    solution = solve(problem, method, time_limit=0.5, max_iterations=10**9)
+    assert not solution.solved and solution.seconds["solve"] < 5.0
 
 
 def test_a_method_that_repeats_itself_is_stopped():
@@ -151,10 +176,8 @@ def test_fallbacks_are_told(caplog):
 
 
 def test_the_default_says_when_it_changes_its_method():
-    """Rigid bodies that share forces among too many contacts: Newton's method alone does not get there."""
-    problem = rigid_bodies(bodies=4, contacts=12, mu=0.8, seed=0)
-    assert not solve(problem, "newton", max_iterations=100).solved
-    solution = solve(problem)
+    """Rigid bodies that share forces among too many contacts: Newton's first steps get nowhere."""
+    solution = solve(rigid_bodies(bodies=4, contacts=12, mu=0.8, seed=0))
     assert solution.solved and any("the proximal loop take over" in sentence for sentence in solution.notes)
 
 

@@ -7,7 +7,17 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from contactopt import InputError, InterfaceProblem, Status, models, natural_map_residual, reduce, scenes, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    Status,
+    diagnose,
+    models,
+    natural_map_residual,
+    reduce,
+    scenes,
+    solve,
+)
 from contactopt.problem import dimensionless
 from contactopt.problem.cones import cylinder_derivative
 from contactopt.problem.laws import LAWS, Law, find_law, make_law
@@ -247,6 +257,12 @@ def test_scenes_say_their_law():
     for bad in (dict(law="magic"), dict(mu=-0.1), dict(mu=[0.1, -0.1]), dict(mu="x")):
         with pytest.raises(InputError):
             replace(scene, **bad)
+
+
+def test_diagnosis_needs_a_friction_coefficient():
+    for law in (Tresca(0.3), Associated(0.3)):
+        with pytest.raises(InputError, match="needs Coulomb's law"):
+            diagnose(random_problem(law))
 
 
 def test_friction_of_the_place():

@@ -143,8 +143,12 @@ class Diagnosis:
 def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Diagnosis:
     """What the compliance says before solving, and with a certified `solution` what its slip map says near it.
 
-    Raises InputError if the solution does not solve this problem, or if its load pulls the bodies apart.
+    Raises InputError for laws without a friction coefficient, if the solution does not solve this problem, or if its load pulls the bodies apart.
     """
+    if not problem.law.proportional or problem.law.dilatant:
+        raise InputError(
+            "diagnose asks what a friction coefficient does, so it needs Coulomb's law or bilateral contact."
+        )
     largest = float(problem.mu.max(initial=0.0))
     scaled, scales = dimensionless(problem)
     scaled = replace(scaled, Q=(scaled.Q + scaled.Q.T) / 2)

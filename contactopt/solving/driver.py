@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +13,8 @@ from contactopt.checks import check_number, real_array
 from contactopt.errors import BackendError, InputError
 from contactopt.problem import InterfaceProblem, Scales, Solution, Status, dimensionless, natural_map_residual
 from contactopt.problem.operators import InterfaceOperator, loosened
-from contactopt.solving.methods import Method, default_method, find_method, solvers_of, solves
+from contactopt.solving.deadline import TimeUp, until
+from contactopt.solving.methods import Iterate, Method, default_method, find_method, solvers_of, solves
 from contactopt.solving.notes import collected
 
 CYCLE = 12  # longest cycle that is looked for
@@ -95,31 +96,16 @@ def _run(
     scaled, scales = dimensionless(problem)
     recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)
     operator = scaled.Q if isinstance(scaled.Q, InterfaceOperator) else None
-    message, status = "", Status.SETTLED
     steps = method.iterate(scaled, None if start is None else _dimensionless_start(start, problem, scales))
-    while True:
+    ended: Status | None = None
+    message = ""
+    while ended is None:
         begin = time.perf_counter()
-        try:
-            with np.errstate(all="ignore"):  # what overflows is seen below
-                iterate = next(steps, None)
-        except BackendError as error:
-            message, status = str(error), Status.BACKEND_FAILED
-            break
-        except np.linalg.LinAlgError as error:
-            message, status = f"the method broke down in its linear algebra: {error}", Status.BACKEND_FAILED
-            break
-        if iterate is None:
-            break
-        if not all(np.all(np.isfinite(part)) for part in iterate):
-            status = Status.DIVERGED
-            break
-        seconds = time.perf_counter() - begin
-        ended = recorder.record(*iterate, seconds, {} if operator is None else {"products": operator.products})
-        if ended is not None:
-            status = ended
-            break
-    if status is not Status.SOLVED and recorder.residual <= tol:
-        status = Status.SOLVED
+        iterate, ended, message = _next(steps, time_limit - recorder.clock)
+        recorder.clock += time.perf_counter() - begin
+        if iterate is not None:
+            ended = recorder.record(*iterate, {} if operator is None else {"products": operator.products})
+    status = Status.SOLVED if recorder.residual <= tol else ended
     return Solution(
         recorder.reactions,
         recorder.multipliers,
@@ -131,6 +117,24 @@ def _run(
         {"solve": recorder.clock, "certificate": recorder.certified},
         message or status.sentence,
     )
+
+
+def _next(steps: Iterator[Iterate], left: float) -> tuple[Iterate | None, Status | None, str]:
+    """The next iterate of a method with `left` seconds to go; without one, how the iteration ended and why."""
+    try:
+        with np.errstate(all="ignore"), until(time.perf_counter() + left):  # what overflows is seen below
+            iterate = next(steps, None)
+    except TimeUp:
+        return None, Status.TIME_LIMIT, ""
+    except BackendError as error:
+        return None, Status.BACKEND_FAILED, str(error)
+    except np.linalg.LinAlgError as error:
+        return None, Status.BACKEND_FAILED, f"the method broke down in its linear algebra: {error}"
+    if iterate is None:
+        return None, Status.SETTLED, ""
+    if not all(np.all(np.isfinite(part)) for part in iterate):
+        return None, Status.DIVERGED, ""
+    return iterate, None, ""
 
 
 def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> Solution:
@@ -180,9 +184,8 @@ class _Recorder:
                 return residual
         return natural_map_residual(self.problem, self.reactions, self.multipliers)
 
-    def record(self, r: np.ndarray, lam: np.ndarray, seconds: float, counts: dict[str, float]) -> Status | None:
+    def record(self, r: np.ndarray, lam: np.ndarray, counts: dict[str, float]) -> Status | None:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
-        self.clock += seconds
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)
         begin = time.perf_counter()
         self.residual = self._certificate()

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.errors import InputError
+from contactopt.solving.deadline import check_time
 
 MARGIN = 1.1  # on the estimate of the largest eigenvalue, which power steps approach from below
 SINGLE = 1e-4  # relative accuracy asked of one round in single precision
@@ -99,6 +100,7 @@ def _descend(
     g = P @ x + c
     p = None  # direction of the conjugate gradients; None: start afresh from the free gradient
     for step in range(limit):
+        check_time()
         free = x > low
         phi, beta = np.where(free, g, 0), np.where(free, 0, np.minimum(g, 0))
         if float(np.sqrt(phi @ phi + beta @ beta)) <= target:

@@ -14,6 +14,7 @@ from contactopt.errors import BackendError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
 from contactopt.problem.operators import diagonal
+from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.krylov import krylov_step
 from contactopt.solving.kernels.semismooth import Equations, Projection
 from contactopt.solving.preconditioners import Preconditioner
@@ -72,6 +73,7 @@ class KrylovSubproblem:
         """The best of STEPS Newton iterates, and its residual."""
         best, point, last = np.inf, (r, lam), np.inf
         for _ in range(STEPS):
+            check_time()
             residual, error, balance, D = equations.evaluate(r, lam)
             if residual < best:
                 best, point = residual, (r, lam)

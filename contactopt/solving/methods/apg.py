@@ -22,6 +22,7 @@ import numpy as np
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
 from contactopt.problem.laws import Projected
+from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.balance import project_balanced
 from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue
 from contactopt.solving.methods import NATIVE, Iterate
@@ -70,6 +71,7 @@ def accelerate(
     """Minimise a quadratic over the convex set of prox, from r (k, d), until a step moves r by at most `accuracy`."""
     y, momentum = r, 1.0
     for _ in range(limit):
+        check_time()
         new, lam = prox(y - step * gradient(y), lam)
         move, along = new - y, new - r
         if np.linalg.norm(move) <= accuracy:

@@ -22,6 +22,7 @@ import numpy as np
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws import Law
+from contactopt.solving.deadline import check_time
 from contactopt.solving.methods import NATIVE, Iterate
 
 LARGEST = 300  # contacts: the tableau has 2 (4 x 300)^2 entries
@@ -78,6 +79,7 @@ def lemke(M: np.ndarray, q: np.ndarray) -> np.ndarray | None:
     T, basis, enter, cover = columns.copy(), np.arange(m), 2 * m, 2 * m
     row = int(np.flatnonzero(q == q.min())[-1])  # the lexicographic least of (q_i, e_i)
     for _ in range(50 * m):
+        check_time()
         T[row] /= T[row, enter]
         T -= np.outer(np.where(np.arange(m) == row, 0.0, T[:, enter]), T[row])
         out, basis[row] = int(basis[row]), enter

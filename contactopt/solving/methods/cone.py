@@ -82,7 +82,7 @@ def _opening(problem: InterfaceProblem, r: np.ndarray, multipliers: np.ndarray) 
 
 def cone_program(problem: InterfaceProblem, bridge: str, backend: str) -> Callable[[np.ndarray], Iterate]:
     """Opening mu s (k,) -> r (k, dim) and multipliers (p,) of the program above."""
-    c, V, s_plates = problem.q.copy(), problem.V, problem.s
+    V, s_plates = problem.V, problem.s
     if bridge == "cvxpy":
         from contactopt.models import acary_cadoux
 
@@ -91,7 +91,8 @@ def cone_program(problem: InterfaceProblem, bridge: str, backend: str) -> Callab
         direct = CoulombSOCP.using(problem.Q, problem.mu, V, s_plates)
 
     def solve(opening: np.ndarray) -> Iterate:
-        c[:, 0] = problem.q[:, 0] + opening
+        c = problem.q.copy()
+        c[:, 0] += opening
         if bridge == "cvxpy":
             mu = problem.mu
             answer = conic.solve(s=np.divide(opening, mu, out=np.zeros_like(mu), where=mu > 0))

@@ -24,6 +24,7 @@ from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
 from contactopt.problem.laws import Law
+from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.balance import project_balanced
 from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue, smalbe
 from contactopt.solving.kernels.semismooth import Projection, crossover
@@ -97,6 +98,7 @@ class Part:
         c, V, s = self.data(r_n, lam)
         radius, own, first = self.problem.law.bound(r_n), lam[self.own], 0.0
         for _ in range(INNER):
+            check_time()
             y = r_t - self.step * ((self.Q @ r_t.ravel()) + c).reshape(self.shape)
             new, own = project_balanced(lambda y: disc_derivative(y, radius), y, V, s, self.step, own)
             move = float(np.linalg.norm(new - r_t))

@@ -1,0 +1,34 @@
+"""The moment at which the step of a method that runs must give up, for inner iterations of thousands of steps.
+
+The driver looks at its clock after each outer iteration. An inner loop that can last longer than a user's patience calls
+`check_time`, which ends the step; the solve then ends with status `time_limit` and the last outer iterate.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+_deadline: ContextVar[float] = ContextVar("deadline of the step that runs", default=float("inf"))
+
+
+class TimeUp(Exception):
+    """The time limit of the solve has passed inside a step of its method."""
+
+
+def check_time() -> None:
+    """Raise TimeUp if the time limit of the solve that runs has passed; costs next to nothing."""
+    if time.perf_counter() > _deadline.get():
+        raise TimeUp
+
+
+@contextmanager
+def until(moment: float) -> Iterator[None]:
+    """Set the deadline, a value of time.perf_counter(), for the `with` block; an earlier one of an outer solve stays."""
+    token = _deadline.set(min(moment, _deadline.get()))
+    try:
+        yield
+    finally:
+        _deadline.reset(token)
