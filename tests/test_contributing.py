@@ -1,6 +1,6 @@
 """What CONTRIBUTING.md says of the project is so; the plug-ins that it shows are added by tests/test_plugins.py."""
 
-import importlib
+import importlib.util
 import re
 import subprocess
 import sys
@@ -73,3 +73,14 @@ def test_version_is_the_same_everywhere():
     assert f"\nversion: {contactopt.__version__}\n" in (ROOT / "CITATION.cff").read_text()
     assert f"\n## [{contactopt.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
     assert f'\nversion = "{contactopt.__version__}"\n' in (ROOT / "pyproject.toml").read_text()
+
+
+def test_modules_moved_to_places_that_exist():
+    """The changelog names the new place of every module; those that it calls old are gone or folders."""
+    text = (ROOT / "CHANGELOG.md").read_text()
+    moved = dict(re.findall(r"^  \| `(contactopt\.\w+)` \| (`.*`) \|$", text, re.M))
+    assert len(moved) > 30
+    for old, new in moved.items():
+        assert not (ROOT / f"{old.replace('.', '/')}.py").exists(), old
+        for name in re.findall(r"`([\w.]+)`", new):
+            assert importlib.util.find_spec(name), f"{old} -> {name}"

@@ -79,3 +79,20 @@ def test_the_comparison_without_crossover_goes_without_it():
     raw = without_crossover("clarabel", problem)
     mended = solve(problem, "alternating", normal="clarabel", tangential="clarabel", tol=1e-9)
     assert mended.solved and abs(raw.reactions - mended.reactions).max() > 1e-14
+
+
+def test_the_picture_of_the_readme_shows_what_its_caption_says():
+    """Computed dots on exact curves, slip and stick named; away from the corners of the curves, where elements blur them."""
+    import numpy as np
+
+    from experiments.questions.contact_picture import picture
+
+    axes = picture().axes[1]
+    assert [text.get_text() for text in axes.texts] == ["slip", "stick", "slip"]
+    pressure, friction, *dots = axes.lines
+    for exact, computed in zip((pressure, friction), dots):
+        x, y = computed.get_data()
+        inside = np.abs(x) < exact.get_xdata().max()
+        expected = np.interp(x, *exact.get_data())
+        assert np.median(np.abs(y - expected)[inside]) < 0.01 * expected.max()
+        assert np.abs(y - expected)[inside].max() < 0.1 * expected.max()
