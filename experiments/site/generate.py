@@ -82,8 +82,8 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
                 yield Path("reports", base(path), picture[1]), path.parent / picture[1]
 
 
-TUTORIAL_TEXT = """Each is a script, a notebook (open the file in Jupyter with jupytext, or in VS Code) and this page,
-about ten minutes to read. All claims are asserted; exercises hide their solutions.
+TUTORIAL_TEXT = """Each tutorial is a script, a notebook (open the file in Jupyter with jupytext, or in VS Code) and a page of
+this site. It takes about ten minutes to read. Every claim is asserted in its code, and the exercises have hidden solutions.
 """
 
 
