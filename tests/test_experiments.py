@@ -96,3 +96,8 @@ def test_the_picture_of_the_readme_shows_what_its_caption_says():
         expected = np.interp(x, *exact.get_data())
         assert np.median(np.abs(y - expected)[inside]) < 0.01 * expected.max()
         assert np.abs(y - expected)[inside].max() < 0.1 * expected.max()
+
+
+def test_questions_stand_in_their_folder():
+    files = {path.name for path in (ROOT / "experiments").glob("*.py")}
+    assert files == {"__init__.py", "report.py"}, "move the question to experiments/questions/"
