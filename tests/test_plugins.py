@@ -71,7 +71,7 @@ def add(kind: Kind, package: Path) -> tuple[list[Path], dict[Path, int]]:
         if table:
             start = re.search(OPENING.format(table=table[1]), text, re.M)
             assert start, f"{table[1]} does not begin in {where[1]}"
-            path.write_text(insert(text, start.end(), code))
+            path.write_text(insert(text, start.end(), code.rstrip(",\n") + ",\n"))
         else:
             assert head.startswith("import in ")
             path.write_text(insert(text, text.index("from contactopt."), code))
