@@ -14,8 +14,8 @@ from contactopt.bodies.refinement import split
 from contactopt.interface.reduction import reduce_bodies
 from contactopt.material import Material
 from contactopt.scenes.scene import Support
-from experiments.accuracy import effectivity, exact
-from experiments.half_space import flat, indenter
+from experiments.questions.accuracy.half_space import flat, indenter
+from experiments.questions.accuracy.measured import effectivity, exact
 
 
 def punch(**changes):

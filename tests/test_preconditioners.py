@@ -14,7 +14,7 @@ from contactopt.solving.preconditioners import (
 )
 from contactopt.solving.preconditioners.circulant import norm, p21, p22, seminorm
 from contactopt.solving.preconditioners.grid import Grid
-from experiments.preconditioners import blocks, condition, solids
+from experiments.questions.preconditioners import blocks, condition, solids
 
 # Condition numbers of the normal block on these bodies, measured on an independent prototype: k -> Q, P21 Q, P22 Q.
 PROTOTYPE = {17: (15.0, 4.67, 6.24), 33: (29.4, 5.84, 6.88), 65: (58.1, 7.12, 7.35)}

@@ -40,7 +40,7 @@ def once(elements: int) -> dict[str, object]:
 
 
 def isolated(elements: int) -> dict[str, object]:
-    command = [sys.executable, "-m", "experiments.large_punch", "--once", str(elements)]
+    command = [sys.executable, "-m", "experiments.questions.large_punch", "--once", str(elements)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return dict(json.loads(done.stdout.splitlines()[-1]))
 
