@@ -27,6 +27,7 @@ import scipy.sparse as sp
 from contactopt.bodies.body import build_body, reload_body
 from contactopt.bodies.solvers import choose
 from contactopt.errors import InputError
+from contactopt.interface.charts import surface_chart
 from contactopt.interface.condensation import ReducedBody, loaded_body, reduce_body
 from contactopt.interface.matching import match_bodies, positions
 from contactopt.problem import InterfaceProblem
@@ -66,7 +67,7 @@ class Reduction:
         problem = self.problem
         if isinstance(problem.Q, InterfaceOperator):
             return problem.Q
-        weights = nodal_weights(problem.coordinates, problem.areas, problem.dim)
+        weights = nodal_weights(problem.chart, problem.areas)
         return _operator(self.bodies, _maps(self.bodies, self.nodes, self.frames), weights)
 
     @property
@@ -142,7 +143,8 @@ def reduce_bodies(
     reduced = (first, second)
     maps = _maps(reduced, nodes, frames)
     points = positions(bodies, nodes)
-    operator = _operator(reduced, maps, nodal_weights(points, areas, scene.dim))
+    chart = surface_chart(scene, points, frames, list(zip(bodies, nodes)))
+    operator = _operator(reduced, maps, nodal_weights(chart, areas))
     q, V, s, plates = _linear_terms(scene, reduced, maps, frames, gap)
     problem = InterfaceProblem(
         operator if Q == "implicit" else operator.to_dense(),
@@ -153,6 +155,7 @@ def reduce_bodies(
         areas,
         points,
         scene.bilateral,
+        chart,
     )
     seconds["compliance"] = time.perf_counter() - start
     return Reduction(scene, problem, reduced, nodes, frames, gap, plates, seconds)

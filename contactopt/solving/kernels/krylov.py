@@ -13,6 +13,7 @@ preconditioned system is that well conditioned whatever sticks, slips or is open
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 
 import numpy as np
@@ -24,6 +25,8 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import loosened
 from contactopt.solving.kernels.semismooth import Equations
 from contactopt.solving.preconditioners import Preconditioner, deflated, preconditioner, restricted, smooth_motions
+
+log = logging.getLogger(__name__)
 
 FLAT = 1e-8  # eigenvalues of D below this are zero
 RESTART, CYCLES = 60, 3  # of GMRES
@@ -45,9 +48,10 @@ def model_of(problem: InterfaceProblem, name: str | None = None) -> Precondition
         try:
             P, Q = preconditioner(problem, name or "neumann"), loosened(problem.Q, MODEL)
             return deflated(P, Q, smooth_motions(problem))
-        except InputError:
+        except InputError as error:
             if name is not None:
                 raise
+            log.warning("iterations go on without a preconditioner: %s", error)
     return Preconditioner(n, lambda x: x)
 
 

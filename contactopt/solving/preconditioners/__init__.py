@@ -88,8 +88,13 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
     def on_grid(act: Product, factor: float) -> Product:
         def apply(x: np.ndarray) -> np.ndarray:
             sorted_ = np.where(still, 0.0, x).reshape(problem.q.shape)[order]
+            if grid.turn is not None:
+                sorted_[:, 1:] = sorted_[:, 1:] @ grid.turn.T
+            made = act(sorted_.reshape(*grid.shape, problem.dim)).reshape(problem.q.shape)
+            if grid.turn is not None:
+                made[:, 1:] = made[:, 1:] @ grid.turn
             out = np.empty(problem.q.shape)
-            out[order] = act(sorted_.reshape(*grid.shape, problem.dim)).reshape(problem.q.shape)
+            out[order] = made
             return np.where(still, x, factor * out.ravel())  # what cannot move is on its own
 
         return apply
@@ -101,10 +106,14 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
     """(k dim, j <= dim^2): constant and linear functions of the place in every component: translations, tilts, stretches.
 
-    Components that cannot move stay at rest; what is then no motion of its own is left out.
+    On a closed line, which has no linear functions, the first cosine and sine take their place. Components that cannot move
+    stay at rest; what is then no motion of its own is left out.
     """
-    place = problem.coordinates[: problem.dim - 1]
-    place = place - place.mean(axis=1, keepdims=True)
+    chart = problem.chart
+    place = chart.places - chart.places.mean(axis=1, keepdims=True)
+    if chart.period is not None:
+        angle = 2 * np.pi * chart.places[0] / chart.period
+        place = np.stack([np.cos(angle), np.sin(angle)])
     functions = [np.ones(problem.contacts), *(x / (np.abs(x).max() or 1.0) for x in place)]
     Z = np.concatenate([np.kron(f[:, None], np.eye(problem.dim)) for f in functions], axis=1)
     Z[held(problem.Q)] = 0.0
