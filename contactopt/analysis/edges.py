@@ -52,8 +52,8 @@ def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
     """Half-width of the contact zone [length].
 
     Where contact ends by itself on a line, its edge is the zero of a straight line through p^2 against x^2 over the outer
-    half of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, and where fewer than
-    three nodes are left, the line goes through the rings of nodes next to the edge. Where every node touches, or where
+    half of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than
+    three nodes are left, and where the other end is a corner, the line goes through the rings of nodes next to the edge. Where every node touches, or where
     contact ends at a corner, the edge is that of the contact surface.
 
     Parameters
@@ -64,7 +64,7 @@ def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
     pressure = reactions[:, 0] / problem.areas
 
     def read(end: End) -> list[float]:
-        if problem.dim == 2 and (edge := _outer_half(end, pressure, problem.areas)) is not None:
+        if problem.dim == 2 and end.free and (edge := _outer_half(end, pressure, problem.areas)) is not None:
             return [edge]
         edge = end.inner(pressure, SMOOTH)
         return [] if edge is None else [end.clip(edge)]

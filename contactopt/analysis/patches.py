@@ -40,12 +40,15 @@ class End:
 
     contact   (m,) their indices;  distance  (m,) from the centre [length];  inside  (m,) whether they belong to the patch
     step      distance of neighbouring nodes next to the edge [length]
+    free      whether the patch ends before the surface does on the other side too: only then are values symmetric about
+              its centre, in the mean, and their squares straight far from the edge
     """
 
     contact: np.ndarray
     distance: np.ndarray
     inside: np.ndarray
     step: float
+    free: bool = True
 
     def inner(self, value: np.ndarray, window: Window) -> float | None:
         """Where value^2, a line in distance^2 through values (k,) inside, is zero [length]; None if it does not fall."""
@@ -126,7 +129,8 @@ class Patch:
         last = float(distance[inside].max())
         if inside.all():
             return last, 0.0
-        edges = read(End(contact, distance, inside, self.step(contact, distance, last)))
+        free = self.centred or not bool(self.inside[~side].all())
+        edges = read(End(contact, distance, inside, self.step(contact, distance, last), free))
         return (float(np.mean(edges)), float(np.ptp(edges)) / 2) if edges else None
 
     def step(self, contact: np.ndarray, distance: np.ndarray, edge: float) -> float:
