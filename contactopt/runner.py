@@ -234,7 +234,14 @@ def _write(result: Result, folder: Path) -> None:
         fields.write_vtu(folder / f"{fields.name}.vtu")
     problem, r = result.problem, result.solution.reactions
     x = problem.chart.places.T if problem.dim == 3 else problem.chart.places[0]
-    tractions = {"pressure": result.pressure, "traction": result.traction}
-    np.savez(folder / "interface.npz", x=x, r_n=r[:, 0], r_t=_squeeze(r[:, 1:]), **tractions)
+    np.savez(
+        folder / "interface.npz",
+        x=x,  # along the contact surface
+        coordinates=problem.coordinates,
+        r_n=r[:, 0],
+        r_t=_squeeze(r[:, 1:]),
+        pressure=result.pressure,
+        traction=result.traction,
+    )
     if result.path is not None:
         result.path.write(folder)

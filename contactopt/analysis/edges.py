@@ -51,9 +51,9 @@ def contact_area(scene: Scene, half_width: float) -> float:
 def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
     """Half-width of the contact zone [length].
 
-    Where contact ends by itself on a line, its edge is the zero of a straight line through p^2 against x^2 over the outer
-    half of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than
-    three nodes are left, and where the other end is a corner, the line goes through the rings of nodes next to the edge. Where every node touches, or where
+    Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against x^2 over the outer half of
+    the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than three nodes are
+    left, and where the other end is a corner, a straight line goes through the rings of nodes next to the edge. Where every node touches, or where
     contact ends at a corner, the edge is that of the contact surface.
 
     Parameters
@@ -136,15 +136,23 @@ def _half_width(
 
 
 def _outer_half(end: End, pressure: np.ndarray, areas: np.ndarray) -> float | None:
-    """Where a line through p^2 against x^2 over the outer half of the half-width is zero; None without three nodes."""
+    """Where a parabola through p^2 over x^2 in the outer half of the half-width is first zero; None if it is not.
+
+    With friction between dissimilar bodies p^2 is not straight over x^2, hence the parabola. Three nodes leave a line.
+    """
     x, inside = end.distance, end.inside
+    last = x[inside].max()
     innermost = np.sort(x[inside])[-OUTER:].min()
-    fitted = inside & (x >= INNER * x[inside].max()) & (x < innermost)
-    if len(np.unique(x[fitted])) < 3:
+    fitted = inside & (x >= INNER * last) & (x < innermost)
+    nodes = len(np.unique(x[fitted]))
+    if nodes < 3:
         return None
     square, weights = pressure[end.contact[fitted]] ** 2, np.sqrt(areas[end.contact[fitted]])
-    slope, height = np.polyfit(x[fitted] ** 2, square, 1, w=weights)
-    return float(np.sqrt(-height / slope)) if slope < 0 < height else None
+    place = (x[fitted] / last) ** 2
+    fit = np.polyfit(place, square / square.max(), min(nodes - 2, 2), w=weights / weights.max())
+    zeros = np.roots(fit)
+    beyond = zeros.real[np.isreal(zeros) & (zeros.real > place.max())]
+    return float(last * np.sqrt(beyond.min())) if len(beyond) else None
 
 
 def _directions(problem: InterfaceProblem, r_t: np.ndarray, slipping: np.ndarray) -> np.ndarray:
