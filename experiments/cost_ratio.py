@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt import Scene, scenes, solve
-from contactopt.bodies.body import Body, build_body
+from contactopt.bodies.body import Assembly, build_body
 from contactopt.bodies.solvers import make_solver
 from contactopt.bodies.solvers.system import System
 from contactopt.interface.reduction import reduce_bodies
@@ -34,7 +34,7 @@ def timed(act: Callable[[], Any]) -> tuple[Any, float, float]:
     return out, time.perf_counter() - wall, time.process_time() - cpu
 
 
-def bonded(upper: Body, lower: Body, solver: str) -> Callable[[], np.ndarray]:
+def bonded(upper: Assembly, lower: Assembly, solver: str) -> Callable[[], np.ndarray]:
     """The direct solve of the bonded bodies under the plate's unit motion: order, factorise, substitute once."""
     count = [b.basis.mesh.p.shape[1] for b in (upper, lower)]
     partner = {tuple(np.round(x, 9)): n for x, n in zip(lower.points.T, lower.nodes)}

@@ -28,7 +28,6 @@ import numpy as np
 
 from contactopt.analysis.edges import contact_edge, stick_edge
 from contactopt.analysis.status import contact_status
-from contactopt.bodies.body import Body
 from contactopt.errors import InputError
 from contactopt.files import whole_folder
 from contactopt.interface.reduction import Reduction, reduce_bodies
@@ -166,7 +165,7 @@ def follow(
 @dataclass(frozen=True, eq=False)
 class _Mechanics:
     """What energies are made of: contact forces r and displacements u, both (k, dim), of each body the displacements U
-    and the external forces F on them (of a rigid body those of its plate components), and the elastic energy."""
+    and the external forces F on them, and the elastic energy of all bodies."""
 
     r: np.ndarray
     u: np.ndarray
@@ -178,30 +177,10 @@ class _Mechanics:
 def _mechanics(reduction: Reduction, solution: Solution) -> _Mechanics:
     """The state of the bodies under contact forces and plate displacements."""
     problem, r = reduction.problem, solution.reactions
-    elastic, start = 0.0, 0
-    U: list[np.ndarray] = []
-    F: list[np.ndarray] = []
-    for body, nodes, sign, plates in zip(reduction.bodies, reduction.nodes, (1.0, -1.0), reduction.plates):
-        own = slice(start, start + plates)
-        start += plates
-        if body is None:
-            U.append(solution.multipliers[own])
-            F.append(problem.s[own])
-            continue
-        force = body.contact_force(nodes, reduction.frames, sign * r)
-        U.append(body.displacement(force, solution.multipliers[own]))
-        inner = body.body.A @ U[-1]
-        F.append(_external(body.body, inner))
-        elastic += float(U[-1] @ inner) / 2
+    U = list(reduction.displaced(r, solution.multipliers))
+    F = [body.external_forces(own) for body, own in zip(reduction.bodies, U)]
+    elastic = sum(body.energy(own) for body, own in zip(reduction.bodies, U))
     return _Mechanics(r, problem.displacements(r, solution.multipliers), U, F, elastic)
-
-
-def _external(body: Body, inner: np.ndarray) -> np.ndarray:
-    """External forces (n,): loads on free unknowns, reactions of supports, and on each plate its total force."""
-    F = inner.copy()
-    F[body.free] = body.load[body.free]
-    total = body.thrust + body.motion.T @ body.load
-    return F + body.motion @ ((total - body.motion.T @ F) / body.motion.sum(axis=0))
 
 
 def _step(
@@ -213,7 +192,7 @@ def _step(
     q[:, 1:] -= earlier
     solution = solve(replace(problem, q=q), start=None if before is None else before.solution, **settings)
     now, gap = _mechanics(reduction, solution), np.zeros(q.shape)
-    gap[:, 0] = reduction.gap
+    gap[:, 0] = reduction.coupling.gap
     if last is None:  # the unloaded bodies
         last = _Mechanics(0 * now.r, gap, [0 * U for U in now.U], [0 * F for F in now.F])
     moved = problem.displacements(0 * now.r, solution.multipliers) - gap

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactopt.analysis.constants import WINDOW
 from contactopt.analysis.edges import contact_edge, stick_edge
 from contactopt.analysis.status import contact_status
 from contactopt.errors import InputError
@@ -18,8 +19,6 @@ from contactopt.problem import InterfaceProblem, Solution
 
 if TYPE_CHECKING:
     from contactopt.interface.reduction import Reduction
-
-WINDOW = 0.5  # of the distance from the largest pressure to the edge: where p^2 is fitted
 
 
 def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
@@ -31,15 +30,9 @@ def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
 
 
 def elastic_energy(reduction: Reduction, solution: Solution) -> float:
-    """Of both bodies, U' A U / 2 [force length]."""
-    energy, start = 0.0, 0
-    for body, nodes, sign, plates in zip(reduction.bodies, reduction.nodes, (1.0, -1.0), reduction.plates):
-        if body is not None:
-            force = body.contact_force(nodes, reduction.frames, sign * solution.reactions)
-            U = body.displacement(force, solution.multipliers[start : start + plates])
-            energy += float(U @ (body.body.A @ U)) / 2
-        start += plates
-    return energy
+    """Of all bodies, the sum of U' A U / 2 [force length]."""
+    displaced = reduction.displaced(solution.reactions, solution.multipliers)
+    return sum(body.energy(U) for body, U in zip(reduction.bodies, displaced))
 
 
 def peak_pressure(reduction: Reduction, solution: Solution) -> float:

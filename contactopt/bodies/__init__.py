@@ -1,0 +1,43 @@
+"""Bodies as matrices: what the interface needs to know of them stands in contactopt.bodies.protocol.
+
+A new kind of body is one module and one line of the table BODIES.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from contactopt.bodies.protocol import AssembledBody
+from contactopt.errors import InputError
+from contactopt.scenes.scene import Part, Rigid, Scene
+
+# class of the part of a scene -> (module, function (scene, part, elements, zone) -> AssembledBody, what it is)
+BODIES: dict[type, tuple[str, str, str]] = {
+    Part: ("contactopt.bodies.elastic", "assemble_elastic", "finite elements with linear elasticity"),
+    Rigid: ("contactopt.bodies.rigid", "assemble_rigid", "a rigid body"),
+}
+
+
+def assemble(scene: Scene, part: Any, elements: int, zone: float | None) -> AssembledBody:
+    """The body that models one part of a scene.
+
+    Parameters
+    ----------
+    scene, part
+        The scene and one of its parts.
+    elements, zone
+        Number of elements across the contact half-width, and the half-width that the mesh resolves [length].
+
+    Raises
+    ------
+    InputError
+        For a part of a class that no kind of body models, and for parts that cannot be modelled.
+    """
+    for kind in type(part).__mro__:  # the class itself before what it derives from
+        if kind in BODIES:
+            module, function, _ = BODIES[kind]
+            made: AssembledBody = getattr(import_module(module), function)(scene, part, elements, zone)
+            return made
+    known = ", ".join(kind.__name__ for kind in BODIES)
+    raise InputError(f"a body of a scene must be one of {known}; got {type(part).__name__}.")

@@ -15,7 +15,7 @@ import skfem
 from scipy.sparse.csgraph import connected_components
 from skfem.helpers import dot
 
-from contactopt.bodies.elements import SHAPES, contact_trace, make_basis, node_unknowns, straight, weight_at
+from contactopt.bodies.elements import SHAPES, Trace, contact_trace, make_basis, node_unknowns, straight, weight_at
 from contactopt.bodies.stiffness import stiffness
 from contactopt.errors import InputError
 from contactopt.material import Material
@@ -23,7 +23,7 @@ from contactopt.scenes.scene import Part, Plate, Scene, Traction
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class Assembly:
     """A discretised Part with n displacement unknowns, of which those in `free` are not prescribed.
 
     A       (n, n) sparse stiffness; not singular on the free unknowns
@@ -31,13 +31,11 @@ class Body:
     lift    (n,) prescribed displacements of the supports, 0 elsewhere
     motion  (n, p) unit motions of the p plate components that may move; zero on free unknowns
     thrust  (p,) total forces on them
-    nodes   (k,) contact nodes on the candidate contact boundary
-    areas   (k,) nodal areas, the integrals of the hat functions over it
-    normals (dim, k) outward unit normals there, averaged over the facets
-    weights (k, nodes) what the displacement of the nodes contributes to that of the contacts (contactopt.bodies.elements)
+    trace   of the displacement on the candidate contact boundary: contact nodes, areas, normals, weights and cells
     """
 
     name: str
+    kind: str
     material: Material
     basis: skfem.CellBasis
     weight: tuple[float, bool]
@@ -47,10 +45,27 @@ class Body:
     free: np.ndarray
     motion: np.ndarray
     thrust: np.ndarray
-    nodes: np.ndarray
-    areas: np.ndarray
-    normals: np.ndarray
-    weights: sp.csr_matrix
+    trace: Trace
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """(k,) contact nodes."""
+        return self.trace.nodes
+
+    @property
+    def areas(self) -> np.ndarray:
+        """(k,) nodal areas."""
+        return self.trace.areas
+
+    @property
+    def normals(self) -> np.ndarray:
+        """(dim, k) outward unit normals at the contact nodes."""
+        return self.trace.normals
+
+    @property
+    def weights(self) -> sp.csr_matrix:
+        """(k, nodes) what the displacement of the nodes contributes to that of the contacts."""
+        return self.trace.weights
 
     @property
     def degree(self) -> int:
@@ -73,17 +88,17 @@ class Body:
         return self.locations[:, self.nodes]
 
     @cached_property
-    def surface(self) -> np.ndarray:
+    def surface_nodes(self) -> np.ndarray:
         """All nodes of the contact boundary, (m,)."""
         return np.unique(self.weights.indices)
 
     @property
     def contact_dofs(self) -> np.ndarray:
         """Displacement unknowns of all nodes of the contact boundary, (m, dim); m = k but for quadratic simplices."""
-        return np.asarray(self.unknowns[:, self.surface].T)
+        return np.asarray(self.unknowns[:, self.surface_nodes].T)
 
 
-def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Body:
+def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Assembly:
     """Mesh and assemble one Part of a Scene; raises InputError for a body that could move freely."""
     mesh = part.build_mesh(elements, zone)
     _check_mesh(scene, part, mesh)
@@ -101,8 +116,9 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> B
     lift, held, motion, thrust = _constraints(scene, part, basis)
     _check_rigid_modes(scene, part, basis, held)
     contact = contact_trace(basis, scene.degree, mesh.boundaries[part.contact], weight)
-    return Body(
+    return Assembly(
         part.name,
+        scene.kind,
         part.material,
         basis,
         weight,
@@ -112,11 +128,11 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> B
         np.flatnonzero(~held),
         motion,
         thrust,
-        *contact,
+        contact,
     )
 
 
-def reload_body(body: Body, scene: Scene, part: Part) -> Body:
+def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     """The same body under the load values of another scene; InputError if other unknowns are held or driven there."""
     lift, held, motion, thrust = _constraints(scene, part, body.basis)
     if not np.array_equal(np.flatnonzero(~held), body.free) or not np.array_equal(motion, body.motion):

@@ -17,7 +17,9 @@ methods for 3D finite deformation contact, SIAM J. Sci. Comput. 34, B421-B446.
 
 from __future__ import annotations
 
+from copy import copy
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -46,6 +48,23 @@ FACES = {
     "RefHex": (*_SQUARE, np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])),
 }
 NOISE = 1e-14  # what rounding leaves of a zero
+
+
+class Trace(NamedTuple):
+    """The displacement on the contact surface, as in the head of this module.
+
+    nodes    (k,) contact nodes of the body
+    areas    (k,) nodal areas, the integrals of the hat functions
+    normals  (dim, k) outward unit normals there, averaged over the facets
+    weights  (k, nodes of the body) the matrix W
+    cells    (v, c) contacts, as places in `nodes`, at the corners of the linear cells
+    """
+
+    nodes: np.ndarray
+    areas: np.ndarray
+    normals: np.ndarray
+    weights: sp.csr_matrix
+    cells: np.ndarray
 
 
 def weight_at(weight: tuple[float, bool], x: np.ndarray) -> np.ndarray | float:
@@ -81,10 +100,8 @@ def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
     return np.concatenate([np.asarray(dofs) for dofs in kinds if np.size(dofs)], axis=1)
 
 
-def contact_trace(
-    basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: tuple[float, bool]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, sp.csr_matrix]:
-    """Contact nodes (k,), areas (k,), outward unit normals (dim, k) and W (k, nodes of the body) of a boundary."""
+def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: tuple[float, bool]) -> Trace:
+    """The trace of the displacement on a boundary (f,) of mesh facets."""
     name = basis.mesh.refdom.__name__
     shape, places, cells = SHAPES[name][1][degree](), FACES[name][2], FACES[name][3]
     if degree == 1:
@@ -111,7 +128,8 @@ def contact_trace(
     W = sp.csr_matrix((value.ravel(), (row.ravel(), column.ravel())), size)
     W.data = _clean(W.data)
     W.eliminate_zeros()
-    return nodes, areas, _clean(normals), W  # exact axes stay exact
+    corners = rows.reshape(-1, rows.shape[2]).T
+    return Trace(nodes, areas, _clean(normals), W, corners)  # exact axes stay exact
 
 
 def _cell_rule(
@@ -137,6 +155,7 @@ def _face_basis(
     if not isinstance(mapping, skfem.MappingAffine):
         corners = mesh.p[:, mesh.facets[:, boundary]]
         rounding = np.finfo(float).eps * np.abs(corners).max() / np.ptp(corners, axis=1).max(axis=0).min()
+        mapping = copy(mapping)  # the mesh keeps its own
         mapping.invF = partial(type(mapping).invF, mapping, newton_tol=max(1e-12, 16 * rule[0].shape[1] * rounding))
     return skfem.FacetBasis(mesh, shape, mapping, facets=boundary, quadrature=rule)
 

@@ -50,7 +50,7 @@ def path_figure(path: PathResult) -> Any:
     loop(path, left)
     energies(path, right)
     scene = path.states[-1].scene
-    figure.suptitle(f"{scene.name}, mu = {scene.mu:g}: {len(path.states)} states")
+    figure.suptitle(f"{scene.name}, mu = {scene.mu_label}: {len(path.states)} states")
     return figure
 
 
@@ -84,7 +84,7 @@ def animate(path: PathResult, file: str | Path) -> None:
     (past,) = right.plot([], [], color=BLUE, lw=1.5)
     (point,) = right.plot([], [], "o", color=ORANGE)
     right.set(xlabel=labels[0], ylabel=labels[1])
-    figure.suptitle(f"{scene.name}, mu = {scene.mu:g}")
+    figure.suptitle(f"{scene.name}, mu = {scene.mu_label}")
 
     def draw(state: int) -> tuple[Any, ...]:
         upper.set_ydata(bound[state])

@@ -44,7 +44,7 @@ def deformed(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], 
     else:
         ax = _draw_section(scene, fields, scale, top, ax, mirror_plane(scene, problem))
     times = f", displacements x {scale:g}" if scale != 1 else ""
-    ax.set_title(f"{scene.name}: deformed bodies, mu = {scene.mu:g}{times}")
+    ax.set_title(f"{scene.name}: deformed bodies, mu = {scene.mu_label}{times}")
     return ax
 
 
@@ -247,7 +247,7 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
     figure = Figure(figsize=(5.4 * len(panels), 4.2), layout="constrained")
     for draw, ax in zip(panels, figure.subplots(1, len(panels))):
         draw(scene, problem, solution, ax)
-    figure.suptitle(f"{scene.name}, mu = {scene.mu:g}: {solution.status}, residual {solution.residual:.1e}")
+    figure.suptitle(f"{scene.name}, mu = {scene.mu_label}: {solution.status}, residual {solution.residual:.1e}")
     return figure
 
 

@@ -1,57 +1,269 @@
-"""The chart of a contact surface, from where its nodes lie and which of them a plane of symmetry holds."""
+"""The contact surface's own coordinates and the local frames, both laid out from the surface itself.
+
+Neither depends on how the bodies lie in space: everything is derived from contact normals, from the cells that join the
+contacts, from planes of symmetry and from the distribution of the areas. A body that is turned takes its chart and its
+frames along.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from contactopt.bodies.body import Body
 from contactopt.problem.chart import Chart
-from contactopt.scenes.scene import Scene
 
-ALONG = 1e-6  # a component of a unit tangent below this does not count
+NEAR = 1e-9  # what counts as zero beside the size of the contact surface, or beside one
+FLAT = 0.1  # a mean normal shorter than this belongs to a surface that closes on itself
+STEEP = 0.9  # cosine beyond which a direction is too near the normal to make a tangent of it
+EQUAL = 1e-3  # relative difference below which principal moments count as equal
+RANK = 1e-6  # places that differ by less than this fraction of the size belong to one row of contacts
 
 
-def surface_chart(
-    scene: Scene, points: np.ndarray, frames: np.ndarray, sides: list[tuple[Body | None, np.ndarray]]
-) -> Chart:
-    """The chart of contacts at points (dim, k) with frames (k, dim, dim), on the sides (body, its contact nodes).
+@dataclass(frozen=True, eq=False)
+class ContactPoints:
+    """What a chart is made from: k contacts of the body that carries them.
 
-    A direction is mirrored where the whole body has images and the contacts at one end are held along that direction.
+    points   (dim, k) positions [length];  normals (dim, k) contact normals;  areas (k,)
+    cells    (v, c) contacts at the corners of the cells of the surface
+    held     (dim, k) whether both bodies are held there in that component
+    gap      (k,) initial gap: where a chart could start at several places it starts where the gap is least
     """
-    held = _held(scene, frames, sides)
-    normal = frames[:, 0].mean(axis=0)
-    t1 = frames[:, 1].mean(axis=0)
-    normal /= np.linalg.norm(normal)
-    t1 = t1 - (t1 @ normal) * normal
-    axes = [t1 / np.linalg.norm(t1)]
-    if scene.dim == 3:
-        axes.append(np.cross(normal, axes[0]))
-    places = np.array(axes) @ points
-    if scene.dim == 2:
-        order = np.argsort(places[0])
-        steps = np.linalg.norm(np.diff(points[:, order], axis=1), axis=0)
-        arc = np.empty(points.shape[1])
-        arc[order] = np.append(0.0, np.cumsum(steps))
-        places = arc[None]
-    mirrored = []
-    for x, still in zip(places, held):
-        ends = [end for end in (x.min(), x.max()) if np.all(still[np.isclose(x, end, rtol=0, atol=1e-9 * np.ptp(x))])]
-        images = (scene.copies > 1 or scene.kind == "axisymmetric") and len(ends) == 1
-        mirrored.append(images)
-        x -= ends[0] if images else (x.min() + x.max()) / 2
-    return Chart(places, tuple(mirrored))
+
+    points: np.ndarray
+    normals: np.ndarray
+    areas: np.ndarray
+    cells: np.ndarray
+    held: np.ndarray
+    gap: np.ndarray
+
+    @property
+    def size(self) -> float:
+        """Largest extent [length]; 1 for a single point."""
+        return float(np.ptp(self.points, axis=1).max(initial=0.0)) or 1.0
 
 
-def _held(scene: Scene, frames: np.ndarray, sides: list[tuple[Body | None, np.ndarray]]) -> np.ndarray:
-    """Mask (dim - 1, k) of the tangential directions in which supports hold every elastic body."""
-    held = np.ones((scene.dim - 1, len(frames)), dtype=bool)
-    for body, nodes in sides:
-        if body is None:
+@dataclass(frozen=True)
+class SymmetryPlane:
+    """A plane on which the bodies are held along its normal only: `inward` (dim,) points to the contacts."""
+
+    inward: np.ndarray
+    offset: float
+
+    def contains(self, points: np.ndarray, size: float) -> np.ndarray:
+        """Mask of the points (dim, k) that lie in the plane."""
+        return np.asarray(np.abs(self.inward @ points - self.offset) <= NEAR * size)
+
+
+def lay_out(contacts: ContactPoints, copies: int, axisymmetric: bool) -> tuple[Chart, np.ndarray, np.ndarray]:
+    """Chart and frames (k, dim, dim) of the contacts in their new order, and this order (k,).
+
+    Contacts are ordered along the contact line, or row by row of the tangent chart. In 2D t1 is n turned clockwise. In 3D
+    it is the first direction of the chart, made orthogonal to n.
+
+    Parameters
+    ----------
+    contacts
+        The contacts in any order.
+    copies
+        Number of mirror images that make the whole bodies: a plane of symmetry mirrors the chart if there is more than one.
+    axisymmetric
+        Whether the first coordinate is the distance from an axis.
+    """
+    planes = _symmetry_planes(contacts)
+    mirrors = copies > 1
+    if axisymmetric and contacts.points[0].min() <= NEAR * contacts.size:
+        planes, mirrors = [SymmetryPlane(np.array([1.0, 0.0]), 0.0)], True
+    if len(contacts.points) == 2:
+        frames = np.stack([contacts.normals.T, _clockwise(contacts.normals).T], axis=1)
+        places, mirrored, period = _line(contacts, frames[:, 1].T, planes, mirrors)
+        order = np.argsort(places[0], kind="stable")
+        return Chart(places[:, order], mirrored, period), frames[order], order
+    axes = _axes(contacts, planes)
+    places, mirrored = _plane(contacts, axes, planes, mirrors)
+    order = np.lexsort([_rank(row, contacts.size) for row in places])
+    return Chart(places[:, order], mirrored), _frames(contacts.normals, axes)[order], order
+
+
+def _clockwise(normals: np.ndarray) -> np.ndarray:
+    return np.stack([normals[1], -normals[0]])
+
+
+def _symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
+    """The planes across one component on which exactly the tangential displacement along it is held."""
+    planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
+    for c, still in enumerate(held):
+        if not still.any():
             continue
-        still = np.ones(len(body.load), dtype=bool)
-        still[body.free] = False
-        component = np.array([still[unknowns[nodes]] for unknowns in body.unknowns])  # (dim, k)
-        for i in range(scene.dim - 1):
-            counts = np.abs(frames[:, 1 + i].T) > ALONG
-            held[i] &= np.all(component | ~counts, axis=0)
-    return held
+        there = points[c, still]
+        offset = float(there.mean())
+        plane = np.abs(points[c] - offset) <= NEAR * contacts.size
+        side = np.sign(points[c, ~plane] - offset)
+        tangential = np.all(np.abs(normals[c, plane]) < 0.5)
+        moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > NEAR), axis=0)  # along the normal, at least
+        if np.array_equal(plane, still) and len(set(side)) == 1 and tangential and np.all(moves):
+            inward = np.zeros(len(points))
+            inward[c] = side[0]
+            planes.append(SymmetryPlane(inward, offset * side[0]))
+    return planes
+
+
+def _line(
+    contacts: ContactPoints, tangents: np.ndarray, planes: list[SymmetryPlane], mirrors: bool
+) -> tuple[np.ndarray, tuple[bool, ...], float | None]:
+    """Arc length (1, k) along t1, whether it is mirrored at 0, and its period if the line is closed.
+
+    It is measured from an end in a plane of symmetry, otherwise from the middle; on a closed line from the contact with
+    the least gap.
+    """
+    chains, period = _chains(contacts, tangents)
+    place = np.zeros(contacts.points.shape[1])
+    end = 0.0
+    for number, (chain, steps) in enumerate(chains):
+        if number:
+            link = chains[number - 1][0][-1:], chain[:1]
+            end += abs(float(_steps(contacts.points, tangents, *link)[0]))
+        place[chain] = end + np.concatenate([[0.0], np.cumsum(steps)])
+        end = float(place[chain[-1]])
+    if period is not None:
+        return place[None], (False,), period
+    ends = [chains[0][0][0], chains[-1][0][-1]]
+    cut = [i for i in ends if any(p.contains(contacts.points[:, [i]], contacts.size)[0] for p in planes)]
+    if cut:
+        at = cut[_least(contacts.gap[cut], contacts.size)]
+        return (place - place[at])[None], (mirrors,), None
+    return (place - end / 2)[None], (False,), None
+
+
+def _chains(contacts: ContactPoints, tangents: np.ndarray) -> tuple[list[tuple[np.ndarray, np.ndarray]], float | None]:
+    """The pieces of the contact line in their order, each as contacts and the steps between them; the period of a loop."""
+    k = contacts.points.shape[1]
+    following, length = np.full(k, -1), np.zeros(k)
+    step = _steps(contacts.points, tangents, *contacts.cells)
+    first, second = np.where(step >= 0, contacts.cells, contacts.cells[::-1])
+    following[first], length[first] = second, np.abs(step)
+    started = np.setdiff1d(np.arange(k), following[following >= 0])
+    if not len(started) and k > 0:  # a closed line
+        start = _least(contacts.gap, contacts.size)
+        chain = _walk(following, start)
+        if len(chain) == k:
+            return [(chain, length[chain[:-1]])], float(length.sum())
+    seen, chains = np.zeros(k, dtype=bool), []
+    for start in [*started, *range(k)]:
+        if not seen[start]:
+            chain = _walk(following, start)
+            seen[chain] = True
+            chains.append((chain, length[chain[:-1]]))
+    mean = tangents @ contacts.areas
+    return sorted(chains, key=lambda piece: float(mean @ contacts.points[:, piece[0]].mean(axis=1))), None
+
+
+def _walk(following: np.ndarray, start: int) -> np.ndarray:
+    chain = [int(start)]
+    while following[chain[-1]] >= 0 and following[chain[-1]] != start:
+        chain.append(int(following[chain[-1]]))
+    return np.array(chain)
+
+
+def _steps(points: np.ndarray, tangents: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """From the contacts i to the contacts j along the mean of their tangents; on a circle this is the chord."""
+    mean, chord = tangents[:, i] + tangents[:, j], points[:, j] - points[:, i]
+    size, along = np.linalg.norm(mean, axis=0), np.sum(mean * chord, axis=0)
+    return np.where(size > NEAR, along / np.maximum(size, NEAR), np.linalg.norm(chord, axis=0))
+
+
+def _least(gap: np.ndarray, size: float) -> int:
+    """Number of the least gap; the first of those that are equal but for rounding."""
+    return int(np.argmax(gap <= gap.min() + NEAR * size))
+
+
+def _axes(contacts: ContactPoints, planes: list[SymmetryPlane]) -> tuple[np.ndarray, np.ndarray]:
+    """Two orthogonal directions (3,) of a surface, right-handed with its normal.
+
+    Planes of symmetry give them: both point into the bodies. One such plane gives the second. Without any the first is the
+    direction in which the areas spread most, or, where they spread evenly, that of the longest edge of the rim.
+    """
+    n = _mean_normal(contacts)
+    inward = [plane.inward - (plane.inward @ n) * n for plane in planes]
+    inward = [s / np.linalg.norm(s) for s in inward if np.linalg.norm(s) > FLAT]
+    pairs = [(a, b) for a in inward for b in inward if np.cross(n, a) @ b > 1 - NEAR]
+    if pairs:
+        return pairs[0]
+    if inward:
+        return np.cross(inward[0], n), inward[0]
+    first = _spread(contacts, n)
+    return first, np.cross(n, first)
+
+
+def _mean_normal(contacts: ContactPoints) -> np.ndarray:
+    """Of the surface, or, where it closes on itself, that of the plane that fits it best."""
+    mean = contacts.normals @ contacts.areas / contacts.areas.sum()
+    size = float(np.linalg.norm(mean))
+    if size > FLAT:
+        return np.asarray(mean / size)
+    centred = contacts.points - contacts.points.mean(axis=1, keepdims=True)
+    vectors = np.linalg.svd(centred, full_matrices=True)[0]
+    return np.asarray(vectors[:, 2] * (1.0 if vectors[:, 2] @ contacts.normals[:, 0] >= 0 else -1.0))
+
+
+def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
+    """The first direction of a surface without planes of symmetry.
+
+    Its sense is that in which the areas reach further, or, where they reach equally far, that of the first contact.
+    """
+    points, areas = contacts.points, contacts.areas
+    centred = points - (points @ areas / areas.sum())[:, None]
+    centred = centred - np.outer(n, n @ centred)
+    moments, vectors = np.linalg.eigh((centred * areas) @ centred.T)
+    if moments[2] - moments[1] > EQUAL * moments[2]:
+        first = vectors[:, 2]
+    else:
+        first = _rim_direction(contacts)
+        first = first - (first @ n) * n
+        first = first / np.linalg.norm(first)
+    along = first @ centred
+    third = float(areas @ along**3) / max(float(areas @ np.abs(along) ** 3), 1e-300)
+    sense = third if abs(third) > EQUAL else float(along[np.argmax(np.abs(along) > NEAR * contacts.size)])
+    return np.asarray(first if sense >= 0 else -first)
+
+
+def _rim_direction(contacts: ContactPoints) -> np.ndarray:
+    """Along the longest edge of the rim, which belongs to one cell only; the first of those that are equally long."""
+    corners = contacts.cells
+    edges = np.concatenate([np.stack([corners[i], corners[i - 1]]) for i in range(len(corners))], axis=1)
+    known, count = np.unique(np.sort(edges, axis=0), axis=1, return_counts=True)
+    rim = known[:, count == 1] if np.any(count == 1) else known
+    chords = contacts.points[:, rim[1]] - contacts.points[:, rim[0]]
+    length = np.linalg.norm(chords, axis=0)
+    return np.asarray(chords[:, np.argmax(length >= length.max() * (1 - NEAR))])
+
+
+def _plane(
+    contacts: ContactPoints, axes: tuple[np.ndarray, np.ndarray], planes: list[SymmetryPlane], mirrors: bool
+) -> tuple[np.ndarray, tuple[bool, ...]]:
+    """Coordinates (2, k) along the axes, from planes of symmetry or from the middle, and which of them are mirrored."""
+    places, mirrored = np.stack(axes) @ contacts.points, []
+    for axis, row in zip(axes, places):
+        across = [p for p in planes if abs(axis @ p.inward) > 1 - NEAR]
+        origin = across[0].offset * float(np.sign(axis @ across[0].inward)) if across else (row.max() + row.min()) / 2
+        row -= origin
+        mirrored.append(mirrors and bool(across))
+    return places, tuple(mirrored)
+
+
+def _rank(row: np.ndarray, size: float) -> np.ndarray:
+    """(k,) numbers of the rows that values belong to; neighbours closer than rounding belong to one."""
+    order = np.argsort(row)
+    rank = np.empty(len(row), dtype=int)
+    rank[order] = np.concatenate([[0], np.cumsum(np.diff(row[order]) > RANK * size)])
+    return rank
+
+
+def _frames(normals: np.ndarray, axes: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Rows n, t1, t2 at each contact: t1 is the first direction made orthogonal to n, or the second where n is close to it."""
+    n = normals.T
+    steep = np.abs(n @ axes[0]) > STEEP
+    towards = np.where(steep[:, None], axes[1], axes[0])
+    t1 = towards - np.sum(towards * n, axis=1)[:, None] * n
+    t1 = t1 / np.linalg.norm(t1, axis=1)[:, None]
+    return np.stack([n, t1, np.cross(n, t1)], axis=1)

@@ -1,99 +1,132 @@
-"""Where two bodies may touch: partners of contact nodes, local frames, initial gap."""
+"""The coupling of bodies whose contact nodes match: every contact of one body has its partner on the other."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from contactopt.bodies.body import Body
+from contactopt.bodies.protocol import AssembledBody, Surface
 from contactopt.errors import InputError
-from contactopt.scenes.scene import Part, Rigid, Scene
+from contactopt.interface.charts import ContactPoints, lay_out
+from contactopt.interface.coupling import Coupling, local_map
+from contactopt.scenes.scene import Scene
 
 MATCH = 1e-6  # nodes match within this fraction of the shortest distance between contact nodes
+LOOSEST = 0.25  # and, where normals of a curved surface are known to its turn only, never beyond this fraction
+NEAREST = 8  # nodes among which the nearest one that faces a node is looked for
+STEPS = 20  # of the search along a normal, which usually takes two
+CHUNK = 256  # nodes that are compared with all others at a time
 
 
-def match_bodies(scene: Scene, upper: Body | None, lower: Body | None) -> tuple[Any, ...]:
-    """Matched contact nodes of both bodies, frames, initial gap and areas."""
-    if upper is not None and lower is not None:
-        own, other = _match(upper, lower)
-        nodes = (upper.nodes[own], lower.nodes[other])
-        normals = lower.normals[:, other]
-        first, second = (
-            b.weights[:, b.surface] @ _true(p, b).T for p, b in zip((scene.upper, scene.lower), (upper, lower))
-        )
-        apart = first[own] - second[other]
+def couple_nodes(scene: Scene, upper: AssembledBody, lower: AssembledBody) -> Coupling:
+    """The coupling whose contacts are the contact nodes of the lower body, or of the upper one if that alone has a mesh.
+
+    Frames and areas are those of the body that the contacts belong to. The contacts are numbered along the chart.
+
+    Raises
+    ------
+    InputError
+        If the contact nodes of two bodies do not match.
+    """
+    if upper.meshed and lower.meshed:
+        first, second = upper.surface(), lower.surface()
+        partner, normals = match(first, second), second.normals
+        apart = (first.weights @ first.places.T)[partner] - second.weights @ second.places.T
         gap = np.sum(normals * apart.T, axis=0)
-        areas = lower.areas[other]
+        lead = second
     else:
-        body, rigid, sign = (upper, scene.lower, -1.0) if upper is not None else (lower, scene.upper, 1.0)
-        assert body is not None and isinstance(rigid, Rigid)
-        own = np.lexsort(body.points)
-        nodes = (body.nodes[own], body.nodes[own])
-        normals = sign * body.normals[:, own]
-        if rigid.normal is not None:
-            normals = np.tile(np.array(rigid.normal)[:, None] / np.linalg.norm(rigid.normal), len(own))
-        areas = body.areas[own]
-        gap = _rigid_gap(scene.upper if upper is not None else scene.lower, body, rigid)[own]
-    return nodes, _frames(normals), gap, areas
+        lead = upper.surface() if upper.meshed else lower.surface()
+        follower, outward = (lower, -lead.normals) if upper.meshed else (upper, lead.normals)
+        other, gap = follower.facing(lead, outward)
+        first, second = (lead, other) if upper.meshed else (other, lead)
+        partner, normals = np.arange(len(gap)), other.normals
+    held = first.held[:, partner] & second.held
+    points = ContactPoints(lead.points, normals, lead.areas, lead.cells, held, gap)
+    chart, frames, order = lay_out(points, scene.copies, scene.kind == "axisymmetric")
+    upper_map, lower_map = local_map(first, partner[order], frames), local_map(second, order, frames)
+    return Coupling(upper_map, lower_map, frames, gap[order], lead.areas[order], lead.points[:, order], chart)
 
 
-def _rigid_gap(part: Part | Rigid, body: Body, rigid: Rigid) -> np.ndarray:
-    """Initial gap (k,) between a body and a rigid one, from the gaps of the nodes with the weights of displacements."""
-    if rigid.gap is None:
-        return np.zeros(len(body.nodes))
-    gap = np.asarray(rigid.gap(_true(part, body)), dtype=float)
-    if gap.shape != body.surface.shape or not np.all(np.isfinite(gap)):
-        raise InputError(f"the gap of rigid body '{rigid.name}' must give one finite number per contact node.")
-    return np.asarray(body.weights[:, body.surface] @ gap)
+def match(upper: Surface, lower: Surface) -> np.ndarray:
+    """For every contact of the lower surface (k,) the number of its partner on the upper one.
 
+    Partners lie on one normal of the lower surface. If this finds no partners and the lower surface nowhere turns away
+    from its mean normal, partners on a common parallel to the mean normal are accepted as well.
 
-def _true(part: Part | Rigid, body: Body) -> np.ndarray:
-    """Where the nodes of the contact boundary lie on the surface that the mesh stands for, (dim, m)."""
-    places = body.locations[:, body.surface]
-    return places if isinstance(part, Rigid) or part.curve is None else np.asarray(part.curve(places), dtype=float)
-
-
-def _match(upper: Body, lower: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Indices into both bodies' contact nodes such that partners lie on one normal; InputError if they do not."""
+    Raises
+    ------
+    InputError
+        If there are no such partners, or if the numbers of contacts differ.
+    """
+    k = lower.points.shape[1]
+    if upper.points.shape[1] != k:
+        raise InputError(
+            f"interface nodes do not match: body '{upper.body}' has {upper.points.shape[1]} contact nodes, "
+            f"body '{lower.body}' has {k}; give both meshes the same nodes there."
+        )
+    spacing = float(KDTree(lower.points.T).query(lower.points.T, k=2)[0][:, 1].min()) if k > 1 else 1.0
     mean = lower.normals @ lower.areas
-    mean /= np.linalg.norm(mean)
-    first, second = (b.points - np.outer(mean, mean @ b.points) for b in (upper, lower))
-    order = np.lexsort(upper.points)
-    distance, partner = KDTree(second.T).query(first.T[order])
-    spacing = KDTree(second.T).query(second.T, k=2)[0][:, 1].min() if second.shape[1] > 1 else 1.0
-    if len(order) != second.shape[1]:
-        raise InputError(
-            f"interface nodes do not match: body '{upper.name}' has {len(order)} contact nodes, "
-            f"body '{lower.name}' has {second.shape[1]}; give both meshes the same nodes there."
-        )
-    if distance.max() > MATCH * max(spacing, 1e-300) or len(np.unique(partner)) < len(partner):
-        raise InputError(
-            f"interface nodes do not match: a contact node of body '{upper.name}' lies {distance.max():.3g} off "
-            f"the normal through the nearest one of body '{lower.name}' (spacing {spacing:.3g}); "
-            "give both meshes the same nodes there."
-        )
-    return order, partner
+    mean = mean / max(float(np.linalg.norm(mean)), 1e-300)
+    turn = _turn(lower)
+    directions = [(lower.normals, turn)]
+    if np.all(mean @ lower.normals > 0.1) and turn.any():
+        directions.append((np.tile(mean[:, None], k), np.zeros(k)))
+    distances = []
+    for direction, slack in directions:
+        partner, off, height = _along(upper, lower, direction, MATCH * spacing)
+        allowed = np.minimum(MATCH + slack * np.abs(height) / max(spacing, 1e-300), LOOSEST) * max(spacing, 1e-300)
+        if np.all(off <= allowed) and len(np.unique(partner)) == k:
+            return partner
+        distances.append(float(off.max()))
+    raise InputError(
+        f"interface nodes do not match: a contact node of body '{upper.body}' lies {min(distances):.3g} off "
+        f"the normal through the nearest one of body '{lower.body}' (spacing {spacing:.3g}); "
+        "give both meshes the same nodes there."
+    )
 
 
-def _frames(normals: np.ndarray) -> np.ndarray:
-    """Rows n, t1[, t2] per node; t1 is the first axis made orthogonal to n (in 2D: n turned clockwise)."""
-    dim, k = normals.shape
-    frames = np.zeros((k, dim, dim))
-    frames[:, 0] = normals.T
-    if dim == 2:
-        frames[:, 1] = np.stack([normals[1], -normals[0]], axis=1)
-        return frames
-    steep = np.abs(normals[0]) > 0.9  # the first axis is nearly normal there: use the second
-    axis = np.where(steep[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
-    t1 = axis - np.sum(axis * normals.T, axis=1)[:, None] * normals.T
-    frames[:, 1] = t1 / np.linalg.norm(t1, axis=1)[:, None]
-    frames[:, 2] = np.cross(frames[:, 0], frames[:, 1])
-    return frames
+def _turn(surface: Surface) -> np.ndarray:
+    """(k,) twice the largest difference between the normal at a contact and those next to it: a bound on its error.
+
+    Normals are means over facets. Inside a smooth surface they are off by less than the turn from one facet to the next,
+    at its rim, where there is one facet only, by half of the facet's own turn.
+    """
+    turn, (normals, cells) = np.zeros(surface.points.shape[1]), (surface.normals, surface.cells)
+    for corner in cells:
+        for other in cells:
+            np.maximum.at(turn, corner, np.linalg.norm(normals[:, corner] - normals[:, other], axis=0))
+    return np.where(turn > 1e-12, 2 * turn, 0.0)
 
 
-def positions(bodies: list[Body | None], nodes: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    body, own = (bodies[1], nodes[1]) if bodies[1] is not None else (bodies[0], nodes[0])
-    assert body is not None
-    return body.locations[:, own]
+def _along(
+    upper: Surface, lower: Surface, direction: np.ndarray, enough: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The partner (k,) of every lower contact along a direction (dim, k), its distance from that line and its height.
+
+    Each search starts at the nearest contact of the upper surface and moves along the line to the height of the contact
+    found, until it finds the same one again. Contacts that face the same way as the lower one, on the far side of a pin in
+    a bush, do not count. Where the search ends further off than `enough`, all contacts of the upper surface are compared.
+    """
+    count = lower.points.shape[1]
+    tree, height = KDTree(upper.points.T), np.zeros(count)
+    found = np.full(count, -1)
+    for _ in range(STEPS):
+        near = tree.query((lower.points + height * direction).T, k=np.arange(1, min(NEAREST, count) + 1))[1]
+        facing = np.einsum("di,dij->ij", lower.normals, upper.normals[:, near]) < 0
+        before, found = found, near[np.arange(count), np.argmax(facing, axis=1)]
+        height = np.sum((upper.points[:, found] - lower.points) * direction, axis=0)
+        if np.array_equal(before, found):
+            break
+    off = np.linalg.norm(upper.points[:, found] - lower.points - height * direction, axis=0)
+    lost = np.flatnonzero(off > enough)
+    for some in (lost[i : i + CHUNK] for i in range(0, len(lost), CHUNK)):
+        apart = upper.points[:, None] - lower.points[:, some, None]  # (dim, some, all)
+        heights = np.einsum("dij,di->ij", apart, direction[:, some])
+        distance = np.linalg.norm(apart - heights * direction[:, some, None], axis=0)
+        distance[lower.normals[:, some].T @ upper.normals >= 0] = np.inf
+        best = np.argmin(distance, axis=1)
+        better = distance[np.arange(len(some)), best] < off[some]
+        found[some[better]] = best[better]
+    height = np.sum((upper.points[:, found] - lower.points) * direction, axis=0)
+    off = np.linalg.norm(upper.points[:, found] - lower.points - height * direction, axis=0)
+    return found, off, height

@@ -2,115 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
-
-import numpy as np
-import skfem
-
-from contactopt.bodies.body import Body
-from contactopt.bodies.elements import SHAPES, straight
-from contactopt.interface.condensation import ReducedBody
+from contactopt.bodies.fields import Fields
 from contactopt.interface.reduction import Reduction
-from contactopt.material import lame
 from contactopt.problem import Solution
 
-STRESSES = {
-    "plane-strain": ("xx", "yy", "zz", "xy"),
-    "axisymmetric": ("rr", "zz", "tt", "rz"),
-    "solid": ("xx", "yy", "zz", "xy", "yz", "xz"),
-}
-PLACES = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
-
-
-@dataclass(frozen=True, eq=False)
-class Fields:
-    """One body after the solve, at the n vertices of its mesh.
-
-    displacement (dim, n) [length];  stress (n, 4 or 6) [stress], components named in `names`;  von_mises (n,)
-    """
-
-    name: str
-    mesh: Any
-    names: tuple[str, ...]
-    displacement: np.ndarray
-    stress: np.ndarray
-    von_mises: np.ndarray
-
-    def write_vtu(self, path: Path) -> None:
-        """The body as a VTU file with displacement, stress components and von Mises stress at the nodes."""
-        from skfem.io.meshio import to_meshio
-
-        flat = {f"stress_{name}": column for name, column in zip(self.names, self.stress.T)}
-        vectors = np.pad(self.displacement, ((0, 3 - len(self.displacement)), (0, 0))).T
-        data = {"displacement": vectors, "von_mises": self.von_mises, **flat}
-        mesh = to_meshio(self.mesh, point_data=data, encode_cell_data=False, encode_point_data=False)
-        mesh.points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
-        mesh.write(path, file_format="vtu")
+__all__ = ["Fields", "recover"]
 
 
 def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:
     """Displacement and stress of the elastic bodies of a solved scene, upper body first."""
-    out, start = [], 0
-    for body, nodes, sign, plates in zip(reduction.bodies, reduction.nodes, (1.0, -1.0), reduction.plates):
-        multipliers = solution.multipliers[start : start + plates]
-        start += plates
-        if body is not None:
-            out.append(body_fields(reduction, body, nodes, sign * solution.reactions, multipliers))
-    return tuple(out)
-
-
-def body_fields(
-    reduction: Reduction, body: ReducedBody, nodes: np.ndarray, reactions: np.ndarray, multipliers: np.ndarray
-) -> Fields:
-    """Fields of one body under contact forces (k, dim) on it, in the local frames, and plate displacements (p,)."""
-    basis = body.body.basis
-    U = body.displacement(body.contact_force(nodes, reduction.frames, reactions), multipliers)
-    stress = nodal_stress(body.body, U)
-    dim = basis.mesh.p.shape[0]
-    full = np.stack([stress[i, j] for i, j in PLACES[dim]], axis=1)
-    mean = np.trace(stress) / 3
-    deviator = stress - mean * np.eye(3)[:, :, None]
-    von_mises = np.sqrt(1.5 * np.sum(deviator**2, axis=(0, 1)))
-    names = STRESSES[reduction.scene.kind]
-    return Fields(body.body.name, straight(basis.mesh), names, U[basis.nodal_dofs], full, von_mises)
-
-
-def nodal_stress(body: Body, U: np.ndarray) -> np.ndarray:
-    """Stress tensor (3, 3, n) at the vertices of the mesh, averaged over the elements with their volumes.
-
-    An element counts with its mean stress where the displacement is linear, with its stress at the vertex where it is
-    quadratic. Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
-    """
-    basis, mesh = body.basis, body.basis.mesh
-    volume = basis.dx.sum(axis=1)
-    if body.degree == 1:
-        element = np.sum(stress_in(body, basis, U) * basis.dx, axis=3) / volume
-        values = np.repeat(element[..., None], len(mesh.t), axis=3)
-    else:
-        corners = SHAPES[mesh.refdom.__name__][1][1].doflocs.T
-        places = skfem.Basis(mesh, basis.elem, quadrature=(corners, np.ones(corners.shape[1])))
-        values = stress_in(body, places, U)
-    vertices, count = mesh.t.T.ravel(), int(mesh.nvertices)
-    weight = np.bincount(vertices, np.repeat(volume, len(mesh.t)), count)
-    total = np.zeros((3, 3, count))
-    for i in range(3):
-        for j in range(3):
-            total[i, j] = np.bincount(vertices, (values[i, j] * volume[:, None]).ravel(), count)
-    return total / weight
-
-
-def stress_in(body: Body, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
-    """Stress tensor (3, 3, elements, points) at the quadrature points of a basis of the body."""
-    lam, shear = lame(body.material)
-    field = basis.interpolate(U)
-    gradient = np.asarray(field.grad)
-    dim = len(gradient)
-    strain = np.zeros((3, 3, *gradient.shape[2:]))
-    strain[:dim, :dim] = (gradient + gradient.swapaxes(0, 1)) / 2
-    if body.weight[1]:  # u_r / r, on the axis its limit
-        r = np.asarray(basis.global_coordinates())[0]
-        away = r > 1e-12 * r.max()
-        strain[2, 2] = np.divide(np.asarray(field)[0], r, where=away, out=gradient[0, 0].copy())
-    return np.asarray(2 * shear * strain + lam * np.trace(strain) * np.eye(3)[:, :, None, None])
+    displaced = zip(reduction.bodies, reduction.displaced(solution.reactions, solution.multipliers))
+    fields = (body.fields(U) for body, U in displaced)
+    return tuple(found for found in fields if found is not None)

@@ -6,17 +6,23 @@ A product costs one solve per body; the entries of Q cost one per interface unkn
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
+from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
+
+log = logging.getLogger(__name__)
 
 FORMS = ("auto", "explicit", "implicit")  # of Q
 NOISE = 1e-13  # relative size of what rounding leaves of a zero
 FINEST = 1e-11  # accuracy of products that is not asked for more
 COLUMNS = 64  # unit vectors handed to the bodies at a time when the entries of Q are asked for
+NOTABLE = 2**28  # bytes of an array Q from which on its size is logged: a quarter of a gigabyte
+MOST = 2**34  # bytes of an array Q that is refused: 16 gigabytes
 
 Product = Callable[[np.ndarray, float | None], np.ndarray]
 
@@ -66,9 +72,10 @@ class InterfaceOperator(LinearOperator):
 
     def to_dense(self) -> np.ndarray:
         """Q as an array (n, n), symmetric to the last digit; n products unless there is a cheaper way."""
+        n = self.shape[0]
+        check_dense(n)
         if self.entries is not None:
             return self.entries()
-        n = self.shape[0]
         Q = np.empty((n, n))
         for first in range(0, n, COLUMNS):
             unit = np.zeros((n, min(COLUMNS, n - first)))
@@ -111,6 +118,24 @@ class InterfaceOperator(LinearOperator):
 
 
 Interface = np.ndarray | InterfaceOperator
+
+
+def check_dense(n: int) -> None:
+    """Before Q (n, n) is formed as an array: log its size if it is NOTABLE, and refuse it beyond MOST.
+
+    Raises
+    ------
+    InputError
+        With the size in bytes, if the array would take more than MOST.
+    """
+    size = 8 * n**2
+    if size > MOST:
+        raise InputError(
+            f"Q as an array of {n} x {n} entries would take {size:,} bytes, more than {MOST:,}; take Q = 'implicit' and a "
+            "method that uses products with Q, such as newton, or fewer elements."
+        )
+    if size >= NOTABLE:
+        log.warning("forming Q as an array of %d x %d entries: %s bytes", n, n, f"{size:,}")
 
 
 def dense(Q: Interface) -> np.ndarray:

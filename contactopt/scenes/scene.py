@@ -110,7 +110,7 @@ class Scene:
 
     The contact normal is the outward normal of `lower`; a positive normal reaction pushes `upper` away from it.
 
-    mu         Coulomb friction coefficient, mu >= 0.
+    mu         Coulomb friction coefficient, mu >= 0: a number, or a function of the contacts' positions (dim, k) -> (k,).
     kind       'plane-strain', 'axisymmetric' (coordinates r, z) or 'solid'.
     thickness  depth of a plane-strain body [length].
     copies     how many mirror images make the whole body: 2 for a half model, 4 for a quarter. Forces, nodal
@@ -127,7 +127,7 @@ class Scene:
     name: str
     upper: Part | Rigid
     lower: Part | Rigid
-    mu: float
+    mu: float | Callable[[np.ndarray], np.ndarray]
     kind: str = "plane-strain"
     thickness: float = 1.0
     copies: int = 1
@@ -141,7 +141,8 @@ class Scene:
     def __post_init__(self) -> None:
         if self.kind not in COMPONENTS:
             raise InputError(f"scene '{self.name}': unknown kind {self.kind!r}; choose from {', '.join(COMPONENTS)}.")
-        check_number("the friction coefficient mu", self.mu, low=0.0, closed=True)
+        if not callable(self.mu):
+            check_number("the friction coefficient mu", self.mu, low=0.0, closed=True)
         check_number("the thickness", self.thickness, low=0.0)
         if self.zone is not None:
             check_number("the contact zone's half-width", self.zone, low=0.0)
@@ -158,6 +159,11 @@ class Scene:
             self._check_part(part)
 
     @property
+    def parts(self) -> tuple[Part | Rigid, ...]:
+        """The bodies, upper first."""
+        return self.upper, self.lower
+
+    @property
     def components(self) -> tuple[str, ...]:
         return COMPONENTS[self.kind]
 
@@ -169,6 +175,38 @@ class Scene:
     def given(self) -> bool:
         """Whether the mesh of a body is given, not made for a number of elements."""
         return any(isinstance(part, Part) and not callable(part.mesh) for part in (self.upper, self.lower))
+
+    @property
+    def mu_label(self) -> str:
+        """The friction coefficient for titles: the number, or that it is a function of the place."""
+        return "mu(x)" if callable(self.mu) else f"{self.mu:g}"
+
+    def friction(self, points: np.ndarray) -> np.ndarray:
+        """The friction coefficient at each of the contacts.
+
+        Parameters
+        ----------
+        points
+            (dim, k) positions of the contacts [length].
+
+        Returns
+        -------
+        (k,) coefficients.
+
+        Raises
+        ------
+        InputError
+            If mu is a function that does not give one finite number >= 0 for each contact.
+        """
+        if not callable(self.mu):
+            return np.full(points.shape[1], float(self.mu))
+        values = np.asarray(self.mu(points), dtype=float)
+        if values.shape != points.shape[1:] or not np.all(np.isfinite(values)) or np.any(values < 0):
+            raise InputError(
+                f"scene '{self.name}': mu as a function must give one finite number >= 0 for each of the "
+                f"{points.shape[1]} contacts."
+            )
+        return values
 
     def _check_part(self, part: Part | Rigid) -> None:
         if isinstance(part, Rigid):

@@ -1,0 +1,251 @@
+"""One elastic body condensed to its contact unknowns and free motions.
+
+A rigid plate on the body moves it: the plate's unit motion M, extended into the body by the stiffness A, is the
+displacement field Z = M - A_ff^-1 A_f: M. Contact forces F and loads f meet in the balance of the plates,
+
+    Z' A Z lambda = thrust + Z' (f - A lift) + Z' F.
+
+Motions that no support resists, the kernel of Z' A Z, become multipliers of the interface problem. The others add to the
+compliance: C = A_ff^-1 + soft soft', where each column of `soft` is one of them, scaled by its stiffness.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.bodies.body import Assembly, build_body, reload_body
+from contactopt.bodies.fields import Fields, fields_of
+from contactopt.bodies.protocol import Mesh, Product, Surface
+from contactopt.bodies.solvers import choose, make_solver
+from contactopt.bodies.solvers.system import BodySolver, System
+from contactopt.errors import InputError
+from contactopt.scenes.scene import Part, Scene
+
+log = logging.getLogger(__name__)
+KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body's stiffness is free
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticBody:
+    """An Assembly with a solver of its linear system, as contactopt.bodies.protocol.Body asks.
+
+    interface   (m,) free unknowns of the contact surface, on which contact forces act
+    at_rest     (n,) displacement without contact forces and multipliers [length]
+    extended    (n, j) displacement fields Z of all plate motions
+    modes       (j, p) and (j, j - p) combinations of them that move freely, and those with elastic resistance, scaled so
+                that each field `soft` = Z modes[1] adds soft soft' to the compliance
+    resultants  (p,) resultants s of the loads in the free motions
+    """
+
+    body: Assembly
+    solver: BodySolver
+    interface: np.ndarray
+    at_rest: np.ndarray
+    extended: np.ndarray
+    modes: tuple[np.ndarray, np.ndarray]
+    resultants: np.ndarray
+
+    @property
+    def name(self) -> str:
+        return self.body.name
+
+    @property
+    def unknowns(self) -> int:
+        return len(self.body.free)
+
+    @property
+    def iterative(self) -> bool:
+        return self.solver.name == "multigrid"
+
+    @property
+    def complete(self) -> bool:
+        return self.solver.last is not None
+
+    @property
+    def parallel(self) -> bool:
+        return self.solver.name != "superlu"  # which keeps Python's lock
+
+    @property
+    def interface_compliance(self) -> np.ndarray:
+        """(m, m) block of A_ff^-1 on `interface` [length / force]; InputError if the body was not prepared for it."""
+        return self.solver.trailing_inverse()
+
+    @cached_property
+    def motions(self) -> np.ndarray:
+        """(n, p) displacement fields of the free plate motions."""
+        return np.asarray(self.extended @ self.modes[0])
+
+    @cached_property
+    def soft(self) -> np.ndarray:
+        """(n, j - p) displacement fields of the plate motions that supports resist."""
+        return np.asarray(self.extended @ self.modes[1])
+
+    @cached_property
+    def _restricted(self) -> Product:
+        """Products with the block of A_ff^-1 on `interface`."""
+        if self.complete:
+            return self.solver.trailing_product
+        return self.solver.restricted(np.searchsorted(self.body.free, self.interface))
+
+    def product(self, T: sp.csr_matrix) -> Product:
+        local, act, soft = T[:, self.interface], self._restricted, T @ self.soft
+        back = local.T.tocsr()
+
+        def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
+            return np.asarray(local @ act(back @ X, accuracy) + soft @ (soft.T @ X))
+
+        return product
+
+    def compliance(self, T: sp.csr_matrix) -> np.ndarray:
+        local, soft = T[:, self.interface], T @ self.soft
+        C = local @ (local @ self.interface_compliance).T
+        return np.asarray((C + C.T) / 2 + soft @ soft.T)
+
+    def moved(self, T: sp.csr_matrix) -> np.ndarray:
+        size = np.asarray(abs(T[:, self.interface]).sum(axis=1)).ravel() + np.abs(T @ self.soft).sum(axis=1)
+        return np.asarray(size > 0)
+
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        """U of all unknowns, eq (13) of the paper."""
+        U = self.at_rest + self.soft @ (self.soft.T @ force) + self.motions @ multipliers
+        U[self.body.free] += self.solver.solve(force[self.body.free])
+        return np.asarray(U)
+
+    def energy(self, U: np.ndarray) -> float:
+        return float(U @ (self.body.A @ U)) / 2
+
+    def external_forces(self, U: np.ndarray) -> np.ndarray:
+        """Loads on free unknowns, reactions of supports, and on the unknowns of each plate its total force, shared out."""
+        body, F = self.body, self.body.A @ U
+        F[body.free] = body.load[body.free]
+        total = body.thrust + body.motion.T @ body.load
+        return np.asarray(F + body.motion @ ((total - body.motion.T @ F) / body.motion.sum(axis=0)))
+
+    def fields(self, U: np.ndarray) -> Fields:
+        return fields_of(self.body, U)
+
+    def loaded(self, scene: Scene, part: Part) -> ElasticBody:
+        return _at_rest(self, reload_body(self.body, scene, part))
+
+
+@dataclass(frozen=True, eq=False)
+class AssembledElastic:
+    """An Assembly with its part of the scene, as contactopt.bodies.protocol.AssembledBody asks."""
+
+    body: Assembly
+    part: Part
+    meshed = True
+
+    @property
+    def name(self) -> str:
+        return self.body.name
+
+    @property
+    def unknowns(self) -> int:
+        return len(self.body.free)
+
+    @property
+    def interface_unknowns(self) -> int:
+        return self.body.contact_dofs.size
+
+    def iterates(self, solver: str) -> bool:
+        chosen = choose(self.unknowns, len(self.body.unknowns)) if solver == "auto" else solver
+        return chosen == "multigrid"
+
+    def surface(self, name: str | None = None) -> Surface:
+        """The contact surface, with the places of its nodes on the curve that the part gives."""
+        body, trace = self.body, self.body.trace
+        if name not in (None, self.part.contact):
+            raise InputError(f"body '{self.name}' has no contact surface {name!r}; it has '{self.part.contact}'.")
+        nodes, unknowns = body.surface_nodes, body.unknowns
+        places = body.locations[:, nodes]
+        if self.part.curve is not None:
+            places = np.asarray(self.part.curve(places), dtype=float)
+        held = np.ones(len(body.load), dtype=bool)
+        held[body.free] = False
+        facets = np.asarray(body.basis.mesh.boundaries[self.part.contact])
+        return Surface(
+            body.name,
+            body.points,
+            body.normals,
+            body.areas,
+            body.weights[:, nodes],
+            places,
+            tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
+            held[unknowns[:, trace.nodes]],
+            trace.cells,
+            Mesh(body.basis, facets, body.weight, nodes, unknowns[:, nodes]),
+        )
+
+    def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
+        raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
+
+    def prepare(self, solver: str, entries: bool) -> ElasticBody:
+        return condense(self.body, solver, entries)
+
+
+def _trace(weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray) -> sp.csr_matrix:
+    """One component of the displacement of the contacts (k,) in terms of all unknowns (n,).
+
+    In general the neighbours of a contact node take part, by its row of the weights. Where the component is prescribed at
+    the contact node itself, as on a plane of symmetry, its displacement is that of the node alone: the weights of a
+    neighbour and of its mirror image, which the model leaves out, cancel each other there.
+    """
+    k = len(nodes)
+    alone = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), weights.shape)
+    prescribed = sp.diags(held[unknowns[nodes]].astype(float))
+    part = sp.coo_matrix(weights - prescribed @ (weights - alone))
+    trace = sp.csr_matrix((part.data, (part.row, unknowns[part.col])), (k, len(held)))
+    trace.eliminate_zeros()
+    return trace
+
+
+def assemble_elastic(scene: Scene, part: Part, elements: int, zone: float | None) -> AssembledElastic:
+    """An elastic Part of a scene on its mesh for `elements` and `zone`."""
+    return AssembledElastic(build_body(scene, part, elements, zone), part)
+
+
+def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> ElasticBody:
+    """Make one body's linear system solvable and condense its plates.
+
+    Parameters
+    ----------
+    body
+        The assembled body.
+    solver
+        'auto' or a name in contactopt.bodies.solvers.SOLVERS.
+    entries
+        Whether to eliminate the contact unknowns last, so that the factors hold their Schur complement: this makes the
+        entries of the compliance cheap, and serves an explicit Q.
+    """
+    dofs, n = body.unknowns, len(body.load)
+    node, component, place = np.empty(n, int), np.empty(n, int), np.full(n, -1)
+    node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
+    place[body.free] = np.arange(len(body.free))
+    interface = np.intersect1d(body.contact_dofs, body.free)
+    A = body.A[body.free][:, body.free]
+    last = place[interface] if entries else None
+    made = make_solver(solver, System(A, node[body.free], component[body.free], body.locations, last))
+    log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
+    extended = body.motion.copy()
+    extended[body.free] -= made.solve((body.A @ body.motion)[body.free])
+    K = extended.T @ (body.A @ extended)
+    stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
+    moves = stiffness <= KERNEL * np.max(np.sum(body.motion * (body.A @ body.motion), axis=0), initial=0.0)
+    free = np.eye(len(K)) if moves.all() else vectors[:, moves]  # keep one multiplier per plate component
+    modes = free, vectors[:, ~moves] / np.sqrt(stiffness[~moves])
+    return _at_rest(ElasticBody(body, made, interface, body.lift, extended, modes, body.thrust), body)
+
+
+def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:
+    """The body `old` under the loads of `body`."""
+    residual = body.load - body.A @ body.lift
+    thrust = body.thrust + old.extended.T @ residual
+    at_rest = body.lift + old.soft @ (old.modes[1].T @ thrust)
+    at_rest[body.free] += old.solver.solve(residual[body.free])
+    return replace(old, body=body, at_rest=at_rest, resultants=old.modes[0].T @ thrust)

@@ -1,0 +1,97 @@
+"""Displacement and stress inside a body of finite elements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import skfem
+
+from contactopt.bodies.body import Assembly
+from contactopt.bodies.elements import SHAPES, straight
+from contactopt.material import lame
+
+STRESSES = {
+    "plane-strain": ("xx", "yy", "zz", "xy"),
+    "axisymmetric": ("rr", "zz", "tt", "rz"),
+    "solid": ("xx", "yy", "zz", "xy", "yz", "xz"),
+}
+PLACES = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """One body after the solve, at the n vertices of its mesh.
+
+    displacement (dim, n) [length];  stress (n, 4 or 6) [stress], components named in `names`;  von_mises (n,)
+    """
+
+    name: str
+    mesh: Any
+    names: tuple[str, ...]
+    displacement: np.ndarray
+    stress: np.ndarray
+    von_mises: np.ndarray
+
+    def write_vtu(self, path: Path) -> None:
+        """The body as a VTU file with displacement, stress components and von Mises stress at the nodes."""
+        from skfem.io.meshio import to_meshio
+
+        flat = {f"stress_{name}": column for name, column in zip(self.names, self.stress.T)}
+        vectors = np.pad(self.displacement, ((0, 3 - len(self.displacement)), (0, 0))).T
+        data = {"displacement": vectors, "von_mises": self.von_mises, **flat}
+        mesh = to_meshio(self.mesh, point_data=data, encode_cell_data=False, encode_point_data=False)
+        mesh.points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
+        mesh.write(path, file_format="vtu")
+
+
+def fields_of(body: Assembly, U: np.ndarray) -> Fields:
+    """Fields of a body at the displacement U (n,) of all its unknowns."""
+    basis = body.basis
+    stress = nodal_stress(body, U)
+    full = np.stack([stress[i, j] for i, j in PLACES[len(body.unknowns)]], axis=1)
+    mean = np.trace(stress) / 3
+    deviator = stress - mean * np.eye(3)[:, :, None]
+    von_mises = np.sqrt(1.5 * np.sum(deviator**2, axis=(0, 1)))
+    return Fields(body.name, straight(basis.mesh), STRESSES[body.kind], U[basis.nodal_dofs], full, von_mises)
+
+
+def nodal_stress(body: Assembly, U: np.ndarray) -> np.ndarray:
+    """Stress tensor (3, 3, n) at the vertices of the mesh, averaged over the elements with their volumes.
+
+    An element counts with its mean stress where the displacement is linear, with its stress at the vertex where it is
+    quadratic. Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
+    """
+    basis, mesh = body.basis, body.basis.mesh
+    volume = basis.dx.sum(axis=1)
+    if body.degree == 1:
+        element = np.sum(stress_in(body, basis, U) * basis.dx, axis=3) / volume
+        values = np.repeat(element[..., None], len(mesh.t), axis=3)
+    else:
+        corners = SHAPES[mesh.refdom.__name__][1][1].doflocs.T
+        places = skfem.Basis(mesh, basis.elem, quadrature=(corners, np.ones(corners.shape[1])))
+        values = stress_in(body, places, U)
+    vertices, count = mesh.t.T.ravel(), int(mesh.nvertices)
+    weight = np.bincount(vertices, np.repeat(volume, len(mesh.t)), count)
+    total = np.zeros((3, 3, count))
+    for i in range(3):
+        for j in range(3):
+            total[i, j] = np.bincount(vertices, (values[i, j] * volume[:, None]).ravel(), count)
+    return total / weight
+
+
+def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
+    """Stress tensor (3, 3, elements, points) at the quadrature points of a basis of the body."""
+    lam, shear = lame(body.material)
+    field = basis.interpolate(U)
+    gradient = np.asarray(field.grad)
+    dim = len(gradient)
+    strain = np.zeros((3, 3, *gradient.shape[2:]))
+    strain[:dim, :dim] = (gradient + gradient.swapaxes(0, 1)) / 2
+    if body.weight[1]:  # u_r / r, on the axis its limit
+        r = np.asarray(basis.global_coordinates())[0]
+        away = r > 1e-12 * r.max()
+        strain[2, 2] = np.divide(np.asarray(field)[0], r, where=away, out=gradient[0, 0].copy())
+    return np.asarray(2 * shear * strain + lam * np.trace(strain) * np.eye(3)[:, :, None, None])

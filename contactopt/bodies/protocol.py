@@ -1,0 +1,178 @@
+"""What the interface asks of a body, whatever the body is made of.
+
+A body comes in two stages. An AssembledBody knows its contact surface and its size, so that bodies can be coupled and
+mistakes be reported before any expensive work. Its `prepare` makes the Body, which moves under contact forces. Finite
+elements (contactopt.bodies.elastic) and rigid bodies (contactopt.bodies.rigid) are the present kinds; the table BODIES
+of contactopt.bodies says which kind models which part of a scene.
+
+Every body has n displacement unknowns U. Under nodal forces F (n,) of the contact and multipliers lambda (p,) it moves by
+
+    U = at_rest + C F + motions lambda,
+
+where C (n, n) is its compliance: symmetric, positive semidefinite and never formed. `resultants` (p,) is the work of the
+loads in each free motion, which the contact forces have to balance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+if TYPE_CHECKING:
+    from contactopt.bodies.fields import Fields
+
+# (X (rows, j), relative accuracy or None for the best there is) -> T C T' X (rows, j)
+Product = Callable[[np.ndarray, float | None], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """The finite elements behind a contact surface, for couplings that integrate over it.
+
+    basis    scikit-fem basis of the displacement, which holds the mesh
+    facets   (f,) numbers of the mesh facets that make up the surface
+    measure  factor of all integrals (thickness, mirror images), and whether they also carry the radius r
+    nodes    (m,) nodes of the body that lie on the surface;  unknowns (dim, m) their displacement unknowns
+    """
+
+    basis: Any
+    facets: np.ndarray
+    measure: tuple[float, bool]
+    nodes: np.ndarray
+    unknowns: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A candidate contact surface of one body: k contacts and m nodes.
+
+    The contacts are the points that may carry a contact force. The nodes are those whose displacements move them. Both
+    are the same for linear elements; quadratic triangles and tetrahedra have more nodes.
+
+    body      name of the body, for messages
+    points    (dim, k) positions of the contacts on the mesh [length]
+    normals   (dim, k) outward unit normals
+    areas     (k,) nodal areas [length^2]
+    weights   (k, m) displacement of the contacts in terms of the displacements of the nodes
+    places    (dim, m) positions of the nodes on the surface that the mesh stands for: the initial gap comes from these
+    traces    for each of the dim components the sparse matrix (k, n) that takes the body's unknowns to the displacement
+              of its contacts in that component
+    held      (dim, k) whether that component of the contact's displacement is prescribed
+    cells     (v, c) contacts at the corners of the c linear cells that cover the surface
+    mesh      the finite elements behind it; None for a body that has none
+    """
+
+    body: str
+    points: np.ndarray
+    normals: np.ndarray
+    areas: np.ndarray
+    weights: sp.csr_matrix
+    places: np.ndarray
+    traces: tuple[sp.csr_matrix, ...]
+    held: np.ndarray
+    cells: np.ndarray
+    mesh: Mesh | None = None
+
+
+class AssembledBody(Protocol):
+    """A body whose surface and size are known, before its linear system is made solvable.
+
+    name                its name in the scene
+    unknowns            number of its free displacement unknowns
+    interface_unknowns  number of those on its contact surface
+    meshed              whether it has contacts of its own; if not, it follows the contacts of the other body
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def unknowns(self) -> int: ...
+
+    @property
+    def interface_unknowns(self) -> int: ...
+
+    @property
+    def meshed(self) -> bool: ...
+
+    def surface(self, name: str | None = None) -> Surface:
+        """The contact surface of that name, by default the one that its part of the scene names."""
+
+    def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
+        """The surface of a body without a mesh at the contacts of another body, and the initial gap (k,) there [length].
+
+        `normals` (dim, k) are the contact normals that the other body suggests. The surface returned holds the contact
+        normals to be used, which may be the body's own.
+        """
+
+    def iterates(self, solver: str) -> bool:
+        """Whether that solver of linear systems, a name or 'auto', works by iteration on this body."""
+
+    def prepare(self, solver: str, entries: bool) -> Body:
+        """The body with its linear system made solvable; `entries` makes the entries of its compliance cheap."""
+
+
+class Body(Protocol):
+    """A body that moves under contact forces, as in the head of this module.
+
+    name        its name in the scene
+    unknowns    number of its free displacement unknowns, for tables
+    at_rest     (n,) displacement at F = 0, lambda = 0 [length]
+    motions     (n, p) free motions
+    resultants  (p,) work of the loads in the free motions [force]
+    iterative   whether products cost iterations, so that a lower accuracy makes them cheaper
+    complete    whether the entries of the compliance are cheap
+    parallel    whether a product is expensive and leaves Python's lock, so that other bodies can work at the same time
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def unknowns(self) -> int: ...
+
+    @property
+    def at_rest(self) -> np.ndarray: ...
+
+    @property
+    def motions(self) -> np.ndarray: ...
+
+    @property
+    def resultants(self) -> np.ndarray: ...
+
+    @property
+    def iterative(self) -> bool: ...
+
+    @property
+    def complete(self) -> bool: ...
+
+    @property
+    def parallel(self) -> bool: ...
+
+    def product(self, T: sp.csr_matrix) -> Product:
+        """Products with T C T', for a sparse map T (rows, n) of the contact unknowns; what they need is prepared once."""
+
+    def compliance(self, T: sp.csr_matrix) -> np.ndarray:
+        """T C T' (rows, rows) as an array, symmetric to the last digit [length / force]."""
+
+    def moved(self, T: sp.csr_matrix) -> np.ndarray:
+        """Mask (rows,) of the rows of T C T' that are not zero: what the body's compliance moves."""
+
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        """U (n,) under contact forces (n,) and multipliers (p,)."""
+
+    def energy(self, U: np.ndarray) -> float:
+        """Elastic energy at the displacement U (n,) [force length]."""
+
+    def external_forces(self, U: np.ndarray) -> np.ndarray:
+        """Forces (n,) of loads, supports and plates on the body in equilibrium at the displacement U (n,)."""
+
+    def fields(self, U: np.ndarray) -> Fields | None:
+        """Displacement and stress at the displacement U (n,); None for a body without any."""
+
+    def loaded(self, scene: Any, part: Any) -> Body:
+        """The same body under the loads of `part` in another scene; InputError if more than load values differ."""

@@ -1,0 +1,111 @@
+"""A rigid body: its compliance is zero, and its displacement unknowns are its motions.
+
+It has one unknown for each component of a translation. Those with a total force are free motions, whose displacements are
+multipliers of the interface problem; the others are held at zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.bodies.protocol import Product, Surface
+from contactopt.errors import InputError
+from contactopt.scenes.scene import Rigid, Scene
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """A rigid body of a scene with the components of its displacement; it needs no preparation, so it is both stages."""
+
+    part: Rigid
+    components: tuple[str, ...]
+
+    unknowns = interface_unknowns = 0
+    meshed = parallel = iterative = False
+    complete = True
+
+    @property
+    def name(self) -> str:
+        return self.part.name
+
+    @property
+    def at_rest(self) -> np.ndarray:
+        return np.zeros(len(self.components))
+
+    @property
+    def motions(self) -> np.ndarray:
+        columns = [self.components.index(name) for name in self._force]
+        return np.eye(len(self.components))[:, columns]
+
+    @property
+    def resultants(self) -> np.ndarray:
+        return np.array(list(self._force.values()), dtype=float)
+
+    @property
+    def _force(self) -> dict[str, float]:
+        return dict(self.part.force or {})
+
+    def surface(self, name: str | None = None) -> Surface:
+        raise InputError(f"rigid body '{self.name}' has no contact surface of its own; it needs a body with a mesh.")
+
+    def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
+        dim, k = other.points.shape
+        if self.part.normal is not None:
+            own = np.array(self.part.normal, dtype=float)
+            normals = np.tile(own[:, None] / np.linalg.norm(own), k)
+        fixed = np.array([name not in self._force for name in self.components])
+        trace = [sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, dim)) for c in range(dim)]
+        held = np.tile(fixed[:, None], k)
+        surface = Surface(
+            self.name, other.points, normals, other.areas, other.weights, other.places, tuple(trace), held, other.cells
+        )
+        return surface, self._gap(other)
+
+    def _gap(self, other: Surface) -> np.ndarray:
+        """The initial gap at the contacts from that at the nodes, with the weights of the displacements."""
+        if self.part.gap is None:
+            return np.zeros(other.points.shape[1])
+        gap = np.asarray(self.part.gap(other.places), dtype=float)
+        if gap.shape != other.places.shape[1:] or not np.all(np.isfinite(gap)):
+            raise InputError(f"the gap of rigid body '{self.name}' must give one finite number per contact node.")
+        return np.asarray(other.weights @ gap)
+
+    def iterates(self, solver: str) -> bool:
+        return False
+
+    def prepare(self, solver: str, entries: bool) -> RigidBody:
+        return self
+
+    def product(self, T: sp.csr_matrix) -> Product:
+        return lambda X, accuracy: np.zeros(X.shape)
+
+    def compliance(self, T: sp.csr_matrix) -> np.ndarray:
+        return np.zeros((T.shape[0], T.shape[0]))
+
+    def moved(self, T: sp.csr_matrix) -> np.ndarray:
+        return np.zeros(T.shape[0], dtype=bool)
+
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        return np.asarray(self.motions @ multipliers)
+
+    def energy(self, U: np.ndarray) -> float:
+        return 0.0
+
+    def external_forces(self, U: np.ndarray) -> np.ndarray:
+        """The total forces. What holds the other components does no work and is left out."""
+        return np.asarray(self.motions @ self.resultants)
+
+    def fields(self, U: np.ndarray) -> None:
+        return None
+
+    def loaded(self, scene: Scene, part: Rigid) -> RigidBody:
+        """With other values of the total force, and other free components if need be."""
+        return assemble_rigid(scene, part, 0, None)
+
+
+def assemble_rigid(scene: Scene, part: Rigid, elements: int, zone: float | None) -> RigidBody:
+    """A Rigid part of a scene. `elements` and `zone` say nothing about it."""
+    return RigidBody(part, scene.components)
