@@ -179,7 +179,7 @@ def _summary(
         "scene": reduction.scene.name,
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
-        "mu": float(reduction.scene.mu),
+        "mu": float(problem.mu.max(initial=0.0)),
         "method": method,
         "normal_backend": backends[0],
         "tangential_backend": backends[1],
