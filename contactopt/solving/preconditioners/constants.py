@@ -1,6 +1,6 @@
 """The fitted numbers of the preconditioners, all of them, and what they were fitted on.
 
-SOFT, CELL and EDGE minimise the condition numbers of the deflated `neumann` on the bodies of
+SOFT, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the bodies of
 `python -m experiments.preconditioners` (reports/preconditioners.md). On bodies that had no part in that fit, `neumann` is
 judged by `python -m experiments.preconditioners_unseen` (reports/preconditioners_unseen/report.md).
 """
