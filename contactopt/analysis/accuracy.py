@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.analysis.constants import BELOW, FIRST, LARGEST, SLOWEST, STUCK
 from contactopt.analysis.paths import PathResult, follow
 from contactopt.analysis.quantities import QUANTITIES, at_rim, uncertainty
 from contactopt.analysis.solve_scene import Options, Solved
@@ -39,12 +40,7 @@ from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution
 from contactopt.scenes.scene import Scene
 
-COARSEST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least
-BELOW = 8  # and by how much fewer than the scene's default
-LARGEST = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about a gigabyte and half a minute
-SLOWEST = 0.75  # least order that is believed: slower ones were noise wherever the exact value was known
 EDGES = ("width", "stick")
-STUCK = 0.1  # order below which a sequence does not converge
 
 
 @dataclass(frozen=True)
@@ -147,7 +143,7 @@ def refine(
     last = search.final()
     message = message or last.failure
     seconds = Counter(last.solution.seconds)
-    seconds["coarse"] += sum(level.seconds for level in search.levels) - last.level.seconds
+    seconds.update({"coarse": sum(level.seconds for level in search.levels) - last.level.seconds})
     last = replace(last, solved=replace(last.solved, solution=replace(last.solution, seconds=dict(seconds))))
     value = last.level.value
     parts: dict[str, Any] = dict.fromkeys(("extrapolated", "error", "mesh_error", "grading_error", "order"))
@@ -187,7 +183,7 @@ class _Search:
         self.states, self.quantity, self.options = states, quantity, options
         scene = states[-1]
         self.given = scene.given
-        self.first = scene.elements if self.given else max(COARSEST[scene.dim], scene.elements // BELOW)
+        self.first = scene.elements if self.given else max(FIRST[scene.dim], scene.elements // BELOW)
         self.best = 2 if quantity in EDGES else 2 * scene.degree
         self.levels: list[Level] = []
         self.meshes: list[Level] = []

@@ -19,17 +19,11 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import KDTree
 
+from contactopt.analysis.constants import INNER, NEAR, OUTER, SMOOTH
 from contactopt.analysis.patches import End, patches_of
 from contactopt.analysis.status import contact_status
 from contactopt.problem import InterfaceProblem
 from contactopt.scenes.scene import Scene
-
-# How many rings of nodes next to an edge are left out, and through how many the line goes; chosen by the errors against
-# exact solutions that `python -m experiments.accuracy` reports.
-SMOOTH = 3, 6  # where contact ends by itself: the outermost carry most of the discretisation error
-NEAR = 1, 2  # where the values are straight only next to the edge
-INNER = 0.5  # share of the half-width from which on the squared pressure on a line is fitted
-OUTER = 2  # nodes next to the edge of contact that this fit leaves out
 
 Reader = Callable[[End], list[float]]
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactopt.analysis.constants import WINDOW
 from contactopt.analysis.edges import contact_edge, stick_edge
 from contactopt.analysis.status import contact_status
 from contactopt.errors import InputError
@@ -18,8 +19,6 @@ from contactopt.problem import InterfaceProblem, Solution
 
 if TYPE_CHECKING:
     from contactopt.interface.reduction import Reduction
-
-WINDOW = 0.5  # of the distance from the largest pressure to the edge: where p^2 is fitted
 
 
 def approach(problem: InterfaceProblem, solution: Solution) -> float | None:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from contactopt.analysis.constants import COARSEST, FACTOR, ROUGH
 from contactopt.interface.reduction import Reduction, reduce_bodies
 from contactopt.problem import Solution
 from contactopt.problem.operators import InterfaceOperator
@@ -20,10 +21,6 @@ from contactopt.problem.transfer import transfer
 from contactopt.scenes.scene import Scene
 from contactopt.solving.driver import solve
 from contactopt.solving.methods import Method
-
-COARSEST = 4  # elements across the contact half-width of the first of nested meshes
-FACTOR = {2: 8, 3: 4}  # coarser than the next of them, where bodies are factorised: a 64th of the unknowns
-ROUGH = 1e-6  # certificate asked of a coarse mesh: its own error is larger
 
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
@@ -104,7 +101,7 @@ def solve_scene(
     if start is None and isinstance(reduction.problem.Q, InterfaceOperator) and not scene.given and coarser >= COARSEST:
         begin = time.perf_counter()
         start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
-        seconds["coarse"] += time.perf_counter() - begin
+        seconds.update({"coarse": time.perf_counter() - begin})
     options.note(f"solving {reduction.problem.contacts} contacts")
     first = None if start is None else transfer(start.reduction.problem, start.solution, reduction.problem)
     solution = solve(reduction.problem, start=first, **options.of_solve)

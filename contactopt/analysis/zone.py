@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 
+from contactopt.analysis.constants import AGREE, LOOPS
 from contactopt.analysis.edges import contact_edge
 from contactopt.analysis.solve_scene import Options, Solved, solve_scene
 from contactopt.analysis.status import contact_status
 from contactopt.errors import InputError
 from contactopt.problem import Status
 from contactopt.scenes.scene import Scene
-
-AGREE = 0.05  # two zones agree when they differ by less than this fraction of an element
-LOOPS = 10  # rounds after which the last zone is taken
 
 
 def solve_zone(
