@@ -7,7 +7,9 @@ up to a factor that no iteration sees. P21 resembles S1 + S2; the matrix that P2
 the sum of P21 along both directions of the contact surface is P31 (29). Extension by zero belongs to functions that
 vanish at the ends (H00^1/2), which a traction at a free edge does not:
     `neumann`, the square root of the Laplacian of the contact line or surface by cosine transforms (contactopt.solving.preconditioners.neumann),
-needs no extension. Each acts on every component by itself. What is left are a few smooth motions of the two bodies against
+needs no extension. A contact line that is closed by itself needs none for P21 and P22 either: the circulant matrices act
+on its own nodes. Contacts are found on their line or grid in the problem's chart, so that it does not matter how the
+bodies are turned. Each preconditioner acts on every component by itself. What is left are a few smooth motions of the two bodies against
 each other, first of all the sway of a slender body: `deflated` solves for them exactly (balancing, Mandel 1993).
 
 Restriction to an active set A: the paper takes the rows and columns A of P. Where P = G^-1 with a cheap product G, which
@@ -76,7 +78,8 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
     """The named approximate inverse of problem.Q, (k dim, k dim).
 
     Uses of Q only its mean diagonal and which components cannot move.
-    Raises InputError for an unknown name, fewer than 3 contacts a side, or contacts not on a line or rectangular grid.
+    Raises InputError for an unknown name, fewer than 3 contacts a side, or contacts not on a line or rectangular grid: the
+    caller says what it does instead.
     """
     find_preconditioner(name)
     still = held(problem.Q)

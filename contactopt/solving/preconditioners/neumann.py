@@ -1,9 +1,10 @@
-"""The grid of the contacts, and `neumann`: the square root of the Laplacian on it by cosine transforms.
+"""`neumann`: the square root of the Laplacian of the contacts, by cosine transforms.
 
-Free ends of a contact line or surface are even (a traction does not vanish there), ends where a plane of symmetry or an
-axis holds a component are odd: cosine and sine transforms. On a line the spacing does not matter: in terms of nodal
-forces the kernel of Q is log |x_i - x_j|, a function of the node numbers up to smooth terms. On a surface it is
-1 / |x_i - x_j|; uneven directions have their own eigenvectors there, a matrix as small as one side of the grid.
+A traction does not vanish at a free end of a contact line or surface: the Laplacian is even there. It is odd where a
+plane of symmetry or an axis holds a component. That makes cosine and sine transforms; a closed line has neither end, and
+takes the Fourier transform. On a line the spacing does not matter: in terms of nodal forces the kernel of Q is
+log |x_i - x_j|, a function of the node numbers up to smooth terms. On a surface the kernel is 1 / |x_i - x_j|, and a
+direction with uneven spacing has eigenvectors of its own: a matrix as small as one side of the grid.
 """
 
 from __future__ import annotations
