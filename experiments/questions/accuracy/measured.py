@@ -48,7 +48,8 @@ def exact(scene: Scene) -> Exact:
 
 def hertz(name: str, elements: int) -> dict[str, object]:
     scene = indenter(KINDS[name])
-    reduction, solution, zones = solve_zone(scene, elements)
+    solved = solve_zone(scene, elements)
+    reduction, solution, zones = solved.reduction, solved.solution, solved.zones
     nodal = (solution.reactions[:, 0] / reduction.problem.areas).max()
     truth = exact(scene)
     return {
@@ -120,7 +121,8 @@ def finite(size: float) -> dict[str, object]:
         ("line", indenter(KINDS["line"], size=size)),
         ("strip", flat(KINDS["line"], 0.3, size=size)),
     ):
-        reduction, solution, _ = solve_zone(scene, 32)
+        solved = solve_zone(scene, 32)
+        reduction, solution = solved.reduction, solved.solution
         for quantity in ("pressure", "width", "approach") if name == "point" else ("pressure", "width"):
             if name != "strip":
                 row[f"{name}, {quantity}"] = QUANTITIES[quantity](reduction, solution)
@@ -152,7 +154,8 @@ def finite_sizes() -> tuple[list[dict[str, object]], float]:
 def stick(kind: str, mu: float) -> dict[str, object]:
     begin = time.perf_counter()
     scene = scenes.rigid_punch(kind, mu=mu)
-    reduction, solution, _ = solve_zone(scene)
+    solved = solve_zone(scene)
+    reduction, solution = solved.reduction, solved.solution
     ratio, truth = QUANTITIES["stick"](reduction, solution), exact(scene)["stick"]
     return {
         "scene": scene.name,
@@ -170,7 +173,8 @@ def locking(nu: float, mu: float) -> dict[str, object]:
     scene = scenes.rigid_punch(lower=Material(5.0, nu), mu=mu)
     row: dict[str, object] = {"nu": nu, "mu": mu, "exact": exact(scene)["stick"]}
     for name, splits, degree in (("linear", 1, 1), ("quadratic", 0, 2)):
-        reduction, solution, _ = solve_zone(replace(split_scene(scene, scene.elements, splits), degree=degree))
+        solved = solve_zone(replace(split_scene(scene, scene.elements, splits), degree=degree))
+        reduction, solution = solved.reduction, solved.solution
         row |= {
             f"{name}, unknowns": reduction.dofs,
             f"{name}, error": QUANTITIES["stick"](reduction, solution) - exact(scene)["stick"],
@@ -222,7 +226,8 @@ def parsimony(kind: str) -> dict[str, list[dict[str, float]]]:
                 seconds, truth = np.inf, exact(scene)
                 for _ in range(3):
                     begin = time.perf_counter()
-                    reduction, solution, _ = solve_zone(scene, elements)
+                    solved = solve_zone(scene, elements)
+                    reduction, solution = solved.reduction, solved.solution
                     seconds = min(seconds, time.perf_counter() - begin)
                 errors = [abs(QUANTITIES[q](reduction, solution) / truth[q] - 1) for q in ("pressure", "width")]
                 row = {"elements": elements, "unknowns": reduction.dofs, "seconds": seconds}
