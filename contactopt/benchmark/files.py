@@ -1,0 +1,60 @@
+"""Files of a campaign and of reports: written whole or not at all, and never outside the folder that the user gave."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from contactopt.checks import check_name
+from contactopt.errors import InputError
+
+
+def subfolder(parent: Path, name: str) -> Path:
+    """The folder parent/name. It need not exist.
+
+    Raises InputError if the name can lead out of `parent`, or if it is a symbolic link there: the folder behind a link
+    was not given by the user, so nothing is written or removed in it.
+    """
+    check_name("the name", name)
+    folder = parent / name
+    if folder.is_symlink():
+        raise InputError(f"'{folder}' is a symbolic link, which is not followed; remove it or choose another directory.")
+    return folder
+
+
+def replace_file(path: Path, write: Callable[[Path], object]) -> None:
+    """Let `write` fill a temporary file in the same folder, then give it the name `path`.
+
+    A symbolic link at `path` is replaced, not followed. When writing fails, nothing is left behind.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=".contactopt-", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    try:
+        write(Path(name))
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(name)
+        raise
+
+
+def remove_files(folder: Path, names: Iterable[str]) -> None:
+    """Remove the files of these names in the folder; links themselves and not what they lead to; other files stay."""
+    for name in names:
+        check_name("the file", name)
+        with suppress(FileNotFoundError, NotADirectoryError):
+            (folder / name).unlink()
+
+
+@contextmanager
+def told(place: Path, advice: str = "choose another directory") -> Iterator[None]:
+    """Turn an OSError within the block, as of a full disk, into one sentence with what to do."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"cannot write into '{place}': {error.strerror or error}; {advice}.") from error
