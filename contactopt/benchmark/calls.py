@@ -57,7 +57,9 @@ def measure(task: Task, problem: InterfaceProblem, start: Solution | None) -> di
     measured["peak_mb"] = peak()
     if not isinstance(outcome, Outcome):
         kinds = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "backend_failed"}
-        return no_answer(next((word for kind, word in kinds.items() if isinstance(outcome, kind)), "error"), outcome, measured)
+        return no_answer(
+            next((word for kind, word in kinds.items() if isinstance(outcome, kind)), "error"), outcome, measured
+        )
     try:
         return read_outcome(outcome, problem, measured)
     except (TypeError, ValueError, AttributeError, OverflowError) as error:

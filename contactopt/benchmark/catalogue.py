@@ -77,10 +77,7 @@ def _checked(arguments: Any) -> Arguments:
 
 def bind(arguments: Arguments, *values: Any, **given: Any) -> None:
     """TypeError, as from the call itself, unless these values fit the arguments."""
-    parameters = [
-        P(name, KINDS[kind], default=None if default else P.empty)
-        for name, kind, default in arguments
-    ]
+    parameters = [P(name, KINDS[kind], default=None if default else P.empty) for name, kind, default in arguments]
     inspect.Signature(parameters).bind(*values, **given)
 
 

@@ -205,7 +205,9 @@ class _Reader:
             raise self.located(str(error), "plugins") from error
         for name in found.problems:
             if name in FAMILIES:
-                raise self.located(f"plug-in problem {name!r} has the name of a family of contactopt; rename it", "plugins")
+                raise self.located(
+                    f"plug-in problem {name!r} has the name of a family of contactopt; rename it", "plugins"
+                )
         return found
 
     def problems(self, index: int, entry: Any, catalogue: Catalogue, skipped: list[str]) -> Iterator[ProblemSpec]:

@@ -21,7 +21,9 @@ def subfolder(parent: Path, name: str) -> Path:
     check_name("the name", name)
     folder = parent / name
     if folder.is_symlink():
-        raise InputError(f"'{folder}' is a symbolic link, which is not followed; remove it or choose another directory.")
+        raise InputError(
+            f"'{folder}' is a symbolic link, which is not followed; remove it or choose another directory."
+        )
     return folder
 
 

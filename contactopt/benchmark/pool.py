@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import subprocess
 import threading
 import time
 from collections import deque
@@ -50,6 +51,7 @@ class Worker:
         self.builder, self.solver = Process("build"), Process("solve")
         self.held: Built | None = None
         self.sent = ""  # label of the problem that the solver keeps
+        self.doubted = ""  # method that failed in the process and may have left it in disorder
         self.cold: set[str] = set()  # methods that did not survive their warm-up
         self.broken: dict[str, str] = {}  # problems that cannot be built -> how
 
@@ -58,6 +60,11 @@ class Worker:
 
     def __exit__(self, *error: object) -> None:
         self.close()
+
+    @property
+    def process(self) -> subprocess.Popen | None:
+        """The process that runs methods, if there is one now."""
+        return self.solver.process
 
     def close(self) -> None:
         self.builder.close()
@@ -82,11 +89,17 @@ class Worker:
             return row | {"status": "refused", "message": one_line(error)}
         begin = time.perf_counter()
         try:
-            return row | judge(task, built.problem, self._answer(task, built))
+            row |= judge(task, built.problem, self._answer(task, built))
+            if task.run.method.plugin is not None and not row["success"] and row["status"] != "refused":
+                self.doubted = task.run.method.label
+            return row
         except Ended as end:
             row |= {"status": end.status, "message": end.message, "call_seconds": time.perf_counter() - begin}
             if end.phase == "neighbour":
-                row |= {"status": "not_built", "message": f"{end.status} while its warm start was sought: {end.message}"}
+                row |= {
+                    "status": "not_built",
+                    "message": f"{end.status} while its warm start was sought: {end.message}",
+                }
             return row
 
     def _build(self, task: Task) -> Built:
@@ -130,11 +143,11 @@ class Worker:
     def _answer(self, task: Task, built: Built) -> Answer:
         """What the method answers. Raises Ended if its process did not outlive it."""
         method = task.run.method.label
+        if self.doubted not in ("", method):
+            self._restart()
         used = self.solver.running and bool(self.sent)
-        if not self.solver.running or self.sent != built.label:
-            problem = built.problem
-        else:
-            problem = None
+        known = self.solver.running and self.sent == built.label
+        problem = None if known else built.problem
         hard = MARGIN * task.time_limit + GRACE
         limits = {START: START_LIMIT, "neighbour": BUILD_LIMIT, "warm up": WARM_UP_LIMIT + hard, "solve": hard}
         room = ROOM + 16.0 * (built.problem.q.size + len(built.problem.s))
@@ -166,7 +179,7 @@ class Worker:
 
     def _restart(self) -> None:
         self.solver.kill()
-        self.sent = ""
+        self.sent = self.doubted = ""
 
 
 class Shares:

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -74,15 +74,13 @@ class Process:
             theirs.close()
         self.channel = Channel(ours)
 
-    def ask(
-        self, request: tuple[Any, ...], limits: Mapping[str, float], most: float, note: Callable[[str], None] = str
-    ) -> Any:
-        """What the process answers to a request; `note` is told each phase that it enters.
+    def ask(self, request: tuple[Any, ...], limits: Mapping[str, float], most: float) -> Any:
+        """What the process answers to a request.
 
         limits  seconds of every phase that the process may enter, START included
         most    bytes of the longest message
-        Raises Ended without an answer; the process is dead then. Each request carries a word of its own that nobody can
-        guess. A message without it, as from a copy of the process that an earlier request left behind, is not taken for
+        Raises Ended without an answer; the process is dead then. Each request carries a word of its own, made at
+        random. A message without it, as from a copy of the process that an earlier request left behind, is not taken for
         an answer.
         """
         self.start()
@@ -100,7 +98,6 @@ class Process:
                     raise ForeignMessage("an unknown message")
                 phase = content
                 deadline = time.monotonic() + limits[phase]
-                note(phase)
         except TimeoutError:
             self.kill()
             raise Ended(phase, "killed", f"still running after {limits[phase]:g} s") from None

@@ -77,7 +77,11 @@ class Channel:
         self.end.close()
 
 
-ARRAYS = {("_reconstruct", "multiarray"), ("scalar", "multiarray"), ("_frombuffer", "numeric")}  # how arrays are pickled
+ARRAYS = {
+    ("_reconstruct", "multiarray"),
+    ("scalar", "multiarray"),
+    ("_frombuffer", "numeric"),
+}  # how arrays are pickled
 
 
 class _DataOnly(pickle.Unpickler):

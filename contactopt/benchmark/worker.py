@@ -99,7 +99,9 @@ def build(spec: ProblemSpec, plugins: tuple[str, ...], diagnosed: bool, memory_l
         problem = spec.build()
         seconds = time.perf_counter() - begin
         if isinstance(problem.Q, InterfaceOperator):
-            raise InputError(f"problem '{spec.label}' must have Q as a matrix; a benchmark hands it to other processes.")
+            raise InputError(
+                f"problem '{spec.label}' must have Q as a matrix; a benchmark hands it to other processes."
+            )
         return {
             "problem": problem,
             "build_seconds": seconds,
