@@ -90,12 +90,15 @@ def run_reports(
             else f"experiments: {', '.join(sorted(missing))}"
         )
         raise InputError(f"unknown {wrong}.")
-    if version:  # complain before anything is run or removed
-        twice = [name for name, n in Counter(read_layout(path).name for path in paths).items() if n > 1]
-        if twice:
-            raise InputError(f"two experiments are called {twice[0]!r}; their results would be mixed, rename one.")
     work = Path("out") / (version or "bench")
     target = work / "reports" if version == "quick" else Path(reports)
+    if version:  # complain before anything is run or removed
+        layouts = [read_layout(path) for path in paths]
+        for layout in layouts:
+            subfolder(target, layout.name)
+        twice = [name for name, n in Counter(layout.name for layout in layouts).items() if n > 1]
+        if twice:
+            raise InputError(f"two experiments are called {twice[0]!r}; their results would be mixed, rename one.")
     for path in paths if version else ():
         if names and path.stem not in names:
             continue

@@ -200,7 +200,9 @@ def _foot(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
         "machine; CPU times are compared, time limits are wall).",
         f"Experiment: [`{layout.path.name}`]({link}); table: [`rows.csv`](rows.csv).",
         f"Made by `contactopt report --run full {layout.path.stem}`; rebuilt from the table by `contactopt report`.",
-        f"Environment: {'; '.join(sorted(set(table['machine'])))}. {'; '.join(sorted(set(table['versions'])))}. One BLAS thread.",
+        one_line(
+            f"Environment: {'; '.join(sorted(set(table['machine'])))}. {'; '.join(sorted(set(table['versions'])))}. One BLAS thread."
+        ),
     ]
     return "\n".join(lines + ([f"Backends: {', '.join(backends)}."] if backends else []))
 

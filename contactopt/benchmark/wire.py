@@ -35,8 +35,12 @@ class Channel:
         """Raises OSError (TimeoutError) if the other end does not take it."""
         data = pickle.dumps(message, protocol=5)
         self.end.settimeout(seconds)
-        self.end.sendall(len(data).to_bytes(HEAD, "big"))
-        self.end.sendall(data)
+        head = len(data).to_bytes(HEAD, "big")
+        if len(data) > BLOCK:
+            self.end.sendall(head)
+            self.end.sendall(data)
+        else:
+            self.end.sendall(head + data)
 
     def receive(self, deadline: float, most: float, alive: Callable[[], bool]) -> bytes:
         """The next message, not longer than `most` bytes, until `deadline` on the monotonic clock.
