@@ -19,6 +19,7 @@ from contactopt.analysis.edges import contact_edge, stick_edge
 from contactopt.analysis.paths import PathResult, follow
 from contactopt.analysis.quantities import approach
 from contactopt.analysis.zone import solve_zone
+from contactopt.benchmark.files import earlier_files, make_folder, remove_empty, remove_files
 from contactopt.errors import InputError
 from contactopt.interface.recovery import Fields, recover
 from contactopt.interface.reduction import Reduction
@@ -214,8 +215,9 @@ def _unwritable(out: Path, error: OSError) -> InputError:
 
 def _write(result: Result, out: Path, seconds: dict[str, float], start: float) -> None:
     """All files into a temporary neighbour first, then into place."""
+    made: list[Path] = []
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        made = make_folder(out)
         staging = Path(tempfile.mkdtemp(prefix=".contactopt-", dir=out))
     except OSError as error:
         raise _unwritable(out, error) from error
@@ -229,13 +231,18 @@ def _write(result: Result, out: Path, seconds: dict[str, float], start: float) -
             if result.path is not None:
                 result.path.write(staging)
         seconds["total"] = time.perf_counter() - start
-        (staging / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")
+        written = {file.name for file in staging.iterdir()} | {"summary.json"}
+        summary = result.summary | {"files": sorted(written)}  # by which the next run knows what to remove
+        (staging / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+        stale = earlier_files(out) - written
         for file in staging.iterdir():
             os.replace(file, out / file.name)
+        remove_files(out, stale)
     except OSError as error:
         raise _unwritable(out, error) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
+        remove_empty(made)
 
 
 def _draw(result: Result, folder: Path) -> None:

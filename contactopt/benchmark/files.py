@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
@@ -51,6 +52,33 @@ def remove_files(folder: Path, names: Iterable[str]) -> None:
         check_name("the file", name)
         with suppress(FileNotFoundError, NotADirectoryError):
             (folder / name).unlink()
+
+
+def earlier_files(folder: Path) -> set[str]:
+    """Names of the files that an earlier run wrote into the folder, as its summary.json lists them under "files"."""
+    summary = folder / "summary.json"
+    if summary.is_symlink() or not summary.is_file():
+        return set()
+    found: set[str] = set()
+    with suppress(OSError, ValueError, TypeError, LookupError):
+        for name in json.loads(summary.read_text())["files"]:
+            check_name("the file", name)
+            found.add(name)
+    return found
+
+
+def make_folder(folder: Path) -> list[Path]:
+    """Make the folder and those above it; the ones that were missing, innermost first, for remove_empty."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    return missing
+
+
+def remove_empty(folders: Iterable[Path]) -> None:
+    """Remove those of the folders that hold nothing."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 @contextmanager
