@@ -1,6 +1,9 @@
 """python -m contactopt"""
 
+import os
 import sys
+
+INTERRUPTED = 130
 
 
 def main() -> int:
@@ -8,10 +11,16 @@ def main() -> int:
     try:
         from contactopt.cli import main
 
-        return main()
+        code = main()
     except KeyboardInterrupt:
         print("contactopt: interrupted", file=sys.stderr)
-        return 130
+        code = INTERRUPTED
+    if code == INTERRUPTED:
+        # CPython ends itself by SIGINT instead, if the interrupt came within exec() of a text, as dataclasses use it.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
 
 
 if __name__ == "__main__":

@@ -65,9 +65,8 @@ def test_an_interrupted_run_leaves_nothing(tmp_path):
             assert not os.path.exists(out.parent)
 
 
-@pytest.mark.parametrize(("option", "value"), [("--elements", "1000000000"), ("--elements", "90000")])
-def test_meshes_that_no_machine_holds_are_one_sentence(tmp_path, capsys, option, value):
-    assert main(["run", "punch-2d", option, value, "--out", str(tmp_path / "out")]) == 2
+def test_meshes_that_no_machine_holds_are_one_sentence(tmp_path, capsys):
+    assert main(["run", "punch-2d", "--elements", "1000000000", "--out", str(tmp_path / "out")]) == 2
     one_line(capsys.readouterr().err, "elements")
     assert not (tmp_path / "out").exists()
 
