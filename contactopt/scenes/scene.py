@@ -17,6 +17,7 @@ from contactopt.errors import InputError
 from contactopt.material import Material
 
 MOST_ELEMENTS = 100_000  # across the contact half-width
+LARGEST = 1e100  # of forces, stresses and lengths: the squares of larger ones are no numbers
 
 # The components of a displacement, in the order of the mesh coordinates.
 COMPONENTS = {"plane-strain": ("x", "y"), "axisymmetric": ("r", "z"), "solid": ("x", "y", "z")}
@@ -201,7 +202,7 @@ class Scene:
                 )
             else:
                 for value in load.value:
-                    check_number(f"every {type(load).__name__} value of body '{part.name}'", value)
+                    check_number(f"every {type(load).__name__} value of body '{part.name}'", value, -LARGEST, LARGEST)
 
     def _check_components(self, body: str, values: Mapping[str, float]) -> None:
         for component, value in values.items():
@@ -209,4 +210,4 @@ class Scene:
                 raise InputError(
                     f"body '{body}': there is no component {component!r}; use {', '.join(self.components)}."
                 )
-            check_number(f"the {component} value of body '{body}'", value)
+            check_number(f"the {component} value of body '{body}'", value, -LARGEST, LARGEST)
