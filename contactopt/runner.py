@@ -231,10 +231,8 @@ def _write(result: Result, out: Path, seconds: dict[str, float], start: float) -
             if result.path is not None:
                 result.path.write(staging)
         seconds["total"] = time.perf_counter() - start
-        written = {file.name for file in staging.iterdir()} | {"summary.json"}
-        summary = result.summary | {"files": sorted(written)}  # by which the next run knows what to remove
-        (staging / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
-        stale = earlier_files(out) - written
+        (staging / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")
+        stale = earlier_files(out) - {file.name for file in staging.iterdir()}
         for file in staging.iterdir():
             os.replace(file, out / file.name)
         remove_files(out, stale)

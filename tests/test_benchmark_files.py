@@ -30,21 +30,22 @@ def test_two_bodies_of_one_name():
 
 
 def test_a_folder_used_again_keeps_nothing_of_the_run_before(tmp_path):
-    """Files of the user's stay, those of the earlier run go; a list that leads elsewhere is not believed."""
-    out = tmp_path / "out"
+    """Files of the user's stay, also where their names look like those of a run; those of the earlier run go."""
+    out, fresh, mine = tmp_path / "out", tmp_path / "fresh", {"notes.txt", "mine.vtu"}
     run(two_blocks("plane-strain"), out)
     first = {file.name for file in out.iterdir()}
-    (out / "notes.txt").write_text("mine")
-    (tmp_path / "precious").write_text("mine")
+    for name in mine:
+        (out / name).write_text("mine")
+    (out / "path.png").write_text("of a run with a load path")
     run(scenes.flat_punch(2, elements=4), out)
-    second = {file.name for file in out.iterdir()} - {"notes.txt"}
-    assert "lower.vtu" in first and (first - second) and (out / "notes.txt").exists()
-    fresh = tmp_path / "fresh"
     run(scenes.flat_punch(2, elements=4), fresh)
-    assert second == {file.name for file in fresh.iterdir()}
-    (out / "summary.json").write_text('{"files": ["notes.txt/../../precious", "../precious"]}')
-    run(scenes.flat_punch(2, elements=4), out)
-    assert (tmp_path / "precious").exists()
+    last = {file.name for file in out.iterdir()}
+    assert last == {file.name for file in fresh.iterdir()} | mine and first - last
+    foreign = tmp_path / "foreign"
+    foreign.mkdir()
+    (foreign / "path.png").write_text("mine")
+    run(scenes.flat_punch(2, elements=4), foreign)
+    assert (foreign / "path.png").read_text() == "mine"
 
 
 def test_an_interrupted_run_leaves_nothing(tmp_path):

@@ -12,6 +12,8 @@ from pathlib import Path
 from contactopt.checks import check_name
 from contactopt.errors import InputError
 
+RUN_FILES = ("deformed.png", "pressure.png", "path.png", "interface.npz", "history.csv", "path.npz")
+
 
 def subfolder(parent: Path, name: str) -> Path:
     """The folder parent/name. It need not exist.
@@ -55,16 +57,21 @@ def remove_files(folder: Path, names: Iterable[str]) -> None:
 
 
 def earlier_files(folder: Path) -> set[str]:
-    """Names of the files that an earlier run wrote into the folder, as its summary.json lists them under "files"."""
-    summary = folder / "summary.json"
-    if summary.is_symlink() or not summary.is_file():
-        return set()
-    found: set[str] = set()
-    with suppress(OSError, ValueError, TypeError, LookupError):
-        for name in json.loads(summary.read_text())["files"]:
-            check_name("the file", name)
-            found.add(name)
-    return found
+    """Names of the files that an earlier `contactopt run` wrote into the folder; empty where none has run.
+
+    A folder in which one has run holds its summary.json. Its other files have fixed names, but for one VTU file per body:
+    those are told from other people's by the field von_mises in them.
+    """
+    with suppress(OSError, ValueError, TypeError):
+        if "contact_nodes" in json.loads(_plain_text(folder / "summary.json")):
+            fields = {file.name for file in folder.glob("*.vtu") if '"von_mises"' in _plain_text(file)}
+            return fields | {name for name in RUN_FILES if (folder / name).exists()}
+    return set()
+
+
+def _plain_text(file: Path) -> str:
+    """What a regular file holds; nothing for links and devices."""
+    return "" if file.is_symlink() or not file.is_file() else file.read_text(errors="replace")
 
 
 def make_folder(folder: Path) -> list[Path]:
