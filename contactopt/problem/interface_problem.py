@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -33,14 +33,15 @@ logger = logging.getLogger(__name__)
 LARGEST = 8e9  # bytes of a Q that is formed in full from its products
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class InterfaceProblem:
     """Contact at k nodes in `dim` dimensions, as in the head of this module.
 
     Q            (k dim, k dim) compliance, symmetric positive semidefinite [length / force]: an array, or an
                  InterfaceOperator that knows it by its products only
     q            (k, dim) displacement at r = 0, lambda = 0 [length]; q_n holds the initial gap
-    law          a Law of contactopt.problem.laws, or friction coefficients mu, one number or (k,), which mean Coulomb's law
+    law          a Law of contactopt.problem.laws, or friction coefficients, one number or (k,), which mean Coulomb's law;
+                 the keyword `mu` may be given in its place
     V, s         (k dim, p) rigid motions and (p,) resultants [force]; p = 0 without a plate
     areas        (k,) nodal areas, force / area = traction; ones by default
     coordinates  (d, k) positions of the nodes in space, for output only; 0, 1, 2, ... by default
@@ -53,13 +54,33 @@ class InterfaceProblem:
     Q: Interface
     q: np.ndarray
     law: Law
-    V: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    s: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    areas: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    coordinates: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    chart: Chart = None  # type: ignore[assignment]
+    V: np.ndarray
+    s: np.ndarray
+    areas: np.ndarray
+    coordinates: np.ndarray
+    chart: Chart
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        Q: Any,
+        q: Any,
+        law: Any = None,
+        V: Any = (),
+        s: Any = (),
+        areas: Any = (),
+        coordinates: Any = (),
+        chart: Chart | None = None,
+        *,
+        mu: Any = None,
+    ):
+        if (law is None) == (mu is None):
+            raise InputError("give either a law or a friction coefficient mu.")
+        given = {"Q": Q, "q": q, "law": mu if law is None else law, "V": V, "s": s, "areas": areas}
+        for name, value in (given | {"coordinates": coordinates, "chart": chart}).items():
+            object.__setattr__(self, name, value)
+        self._check()
+
+    def _check(self) -> None:
         q = np.atleast_2d(real_array("q", self.q))
         k, dim = q.shape if q.ndim == 2 else (len(q), 0)
         if dim not in (2, 3):
