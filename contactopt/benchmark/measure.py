@@ -27,7 +27,7 @@ from contactopt.problem import (
     fit_multipliers,
     natural_map_residual,
 )
-from contactopt.problem.certificate import balanced_step
+from contactopt.problem.certificate import yardsticks
 from contactopt.problem.cones import coulomb_cone
 from contactopt.solving.driver import solve
 from contactopt.solving.methods import find_method
@@ -206,16 +206,16 @@ def judge(task: Task, problem: InterfaceProblem, outcome: Outcome, seconds: floa
 
 
 def associated_residual(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray | None) -> float:
-    """As natural_map_residual for the associated law: |r - proj_K(r - rho u)| over the same size, and the balance."""
+    """As natural_map_residual for the associated law: the largest |r_i - proj_K(r_i - rho_i u_i)| / F, and the balance."""
     if not np.all(np.isfinite(r)):
         return np.inf
     lam = fit_multipliers(problem, r) if lam is None else lam
     w = problem.q + (problem.V @ lam).reshape(r.shape)
     moved = (problem.Q @ r.ravel()).reshape(r.shape)
-    rho = balanced_step(r, moved, moved + w, w)
-    size = max(np.linalg.norm(r), rho * np.linalg.norm(w), rho * np.linalg.norm(moved + w))
-    gap = np.linalg.norm(r - coulomb_cone(r - rho * (moved + w), problem.mu))
-    return float(max(gap / size if size > 0 else 0.0, balance_residual(problem, r)))
+    measure = yardsticks(problem, r, moved, w)
+    errors = np.linalg.norm(r - coulomb_cone(r - measure.rho[:, None] * (moved + w), problem.mu), axis=1)
+    gap = float(errors.max(initial=0.0)) / measure.force if measure.force > 0 else 0.0
+    return max(gap, balance_residual(problem, r, measure.force))
 
 
 def thinned(history: tuple[dict[str, float], ...]) -> str:

@@ -3,7 +3,7 @@
 Nothing here, or below in what it imports, knows finite elements.
 """
 
-from contactopt.problem.certificate import balance_residual, fit_multipliers, natural_map_residual
+from contactopt.problem.certificate import balance_residual, fit_multipliers, natural_map_residual, siconos_residual
 from contactopt.problem.chart import Chart
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.scaling import Scales, dimensionless
@@ -19,4 +19,5 @@ __all__ = [
     "dimensionless",
     "fit_multipliers",
     "natural_map_residual",
+    "siconos_residual",
 ]

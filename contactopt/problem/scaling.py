@@ -28,8 +28,8 @@ class Scales:
 def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     """The same problem with mean diagonal of Q one, forces of order one and unit columns of V.
 
-    The force scale is the mean force that the balance asks of a node or, without a balance, the force that closes
-    the root-mean-square of q at one node. Every change of units of the input gives the same numbers here.
+    The force scale is the mean force that the balance asks of a node or, without a balance, the force that removes the
+    root-mean-square overlap at one node; gaps, however wide, do not count. Every change of units of the input gives the same numbers here.
     A component that cannot move (on a symmetry plane, say) carries no force that matters: a unit compliance there
     makes that force zero instead of undetermined.
     """
@@ -38,7 +38,7 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     columns = np.linalg.norm(problem.V, axis=0)
     total = np.abs(problem.V).sum(axis=0)
     resultant = np.divide(np.abs(problem.s), total, out=np.zeros(len(problem.s)), where=total > 0)
-    force = float(resultant.max(initial=0.0)) or float(np.sqrt(np.mean(problem.q**2))) / compliance or 1.0
+    force = float(resultant.max(initial=0.0)) or _closing(problem) / compliance or 1.0
     length = force * compliance
     columns = np.where(columns > 0, columns, 1.0)
     implicit = isinstance(problem.Q, InterfaceOperator)
@@ -60,3 +60,14 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
         s=problem.s / (columns * force),
     )
     return scaled, Scales(force, length, length / columns)
+
+
+def _closing(problem: InterfaceProblem) -> float:
+    """Root mean square of the overlaps of the contacts that overlap at r = 0; without any, of the least |q_i| > 0."""
+    normal = problem.q[:, 0]
+    overlap = np.abs(normal) if problem.bilateral else -normal
+    overlap = overlap[overlap > 0]
+    if len(overlap):
+        return float(np.sqrt(np.mean(overlap**2)))
+    sizes = np.linalg.norm(problem.q, axis=1)
+    return float(sizes[sizes > 0].min(initial=np.inf)) if np.any(sizes > 0) else 0.0
