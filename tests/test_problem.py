@@ -80,7 +80,7 @@ def test_bilateral_contact_carries_tension_and_its_friction():
 def test_balance_counts(punch):
     r = solve(punch, tol=1e-10).reactions.copy()
     r[:, 0] *= 1.01
-    assert balance_residual(punch, r) == pytest.approx(0.01 / 2.01, rel=1e-6)
+    assert balance_residual(punch, r) == pytest.approx(0.01, rel=1e-6)  # of the plate's force
     assert natural_map_residual(punch, r) >= balance_residual(punch, r)
 
 

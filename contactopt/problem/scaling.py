@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.problem.interface_problem import InterfaceProblem
-from contactopt.problem.operators import NOISE, Interface, InterfaceOperator, diagonal
+from contactopt.problem.operators import NOISE, Interface, InterfaceOperator, diagonal, row_sizes
 
 
 @dataclass(frozen=True)
@@ -41,13 +42,14 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     force = float(resultant.max(initial=0.0)) or _closing(problem) / compliance or 1.0
     length = force * compliance
     columns = np.where(columns > 0, columns, 1.0)
-    implicit = isinstance(problem.Q, InterfaceOperator)
-    sizes = d if implicit else np.abs(problem.Q).max(axis=1)
+    sizes = d if isinstance(problem.Q, InterfaceOperator) else row_sizes(problem.Q)
     moves = [sizes, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
     rigid = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
     Q: Interface
     if isinstance(problem.Q, InterfaceOperator):
         Q = problem.Q.scaled(1 / compliance, rigid.astype(float))
+    elif sp.issparse(problem.Q):
+        Q = sp.csr_array(problem.Q / compliance + sp.diags_array(rigid.astype(float)))
     else:
         entries = np.array(problem.Q / compliance)
         entries[rigid, rigid] = 1.0
