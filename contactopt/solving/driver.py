@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
@@ -57,7 +58,7 @@ def solve(
             f"settings {', '.join(settings)} belong to a method given by name; set them on the method object."
         )
     _check_equilibrium(problem)
-    if not getattr(method, "implicit", False):
+    if not getattr(method, "sparse" if sp.issparse(problem.Q) else "implicit", False):
         problem = problem.explicit()
     scaled, scales = dimensionless(problem)
     recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)

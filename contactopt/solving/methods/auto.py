@@ -1,10 +1,12 @@
 """The default, without a number to choose: Newton's method, and where it fails cones, then the proximal loop.
 
-1. Newton's method from the bonded solution (or no force at all) while its residual falls: elastic bodies end here
-   (reports/newton_steps), each step one dense linear system.
-2. CONES iterations of the Acary-Cadoux fixed point: convex programs, which no cycle and no rank deficiency of Q disturbs.
-3. The proximal loop from there, which needs no symmetric Q and no backend.
-4. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
+1. Unless Q is sparse (rigid bodies): Newton's method from the bonded solution (or no force at all) while its residual
+   falls. Elastic bodies end here (reports/newton_steps), each step one dense linear system.
+2. The interior-point method (contactopt.solving.kernels.interior), which no cycle and no rank deficiency of Q disturbs,
+   and a few steps of the proximal loop for the last digits. They need no symmetric Q and no backend.
+3. Where these fail and Q is a symmetric array: CONES iterations of the Acary-Cadoux fixed point, convex programs.
+4. The proximal loop from the best of these points.
+5. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
    contact forces drawn at random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
    friction may have solutions that repel the loop and others that attract it.
 It ends where the driver's certificate or limits say so. There is no proof that it finds a solution: Coulomb's problem
@@ -19,6 +21,7 @@ from itertools import count, islice
 from typing import ClassVar
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.errors import BackendError
 from contactopt.problem import InterfaceProblem
@@ -28,13 +31,16 @@ from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equatio
 from contactopt.solving.methods import NATIVE, Iterate
 from contactopt.solving.methods.cone import AcaryCadoux
 from contactopt.solving.methods.newton import Newton
-from contactopt.solving.methods.proximal import Proximal
+from contactopt.solving.kernels.interior import NEAR, interior_iterates
+from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
+from contactopt.solving.methods.proximal import Proximal, proximal_equations, proximal_iterates
 from contactopt.solving.preconditioners import find_preconditioner
 
 LIMIT = 25  # Newton steps
 PATIENCE = 6  # of them without progress
 PROGRESS = 0.9  # a residual that falls by less is no progress
 CONES = 5  # cone programs
+FEW = 10  # proximal steps for the last digits, each so many of which must halve the residual
 ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
 LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 
@@ -45,6 +51,7 @@ class Auto:
 
     preconditioner: str | None = None
     implicit: ClassVar[bool] = True
+    sparse: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         find_preconditioner(self.preconditioner)
@@ -53,12 +60,21 @@ class Auto:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        reached = yield from self._newton(problem, start, self.preconditioner)
-        problem = problem.explicit()  # all that follows looks at the entries of Q
-        reached = yield from self._cones(problem, reached)
+        if sp.issparse(problem.Q):
+            reached = start or (np.zeros(problem.q.shape), np.zeros(len(problem.s)))
+        else:
+            reached = yield from self._newton(problem, start, self.preconditioner)
+            problem = problem.explicit()  # all that follows looks at the entries of Q
+        matrix = block_matrix(problem.Q, problem.dim)
+        if start is not None and sp.issparse(problem.Q):
+            reached = yield from self._proximal(problem, matrix, start, FEW, NEAR)
+        if not problem.bilateral:
+            reached = yield from self._interior(problem, matrix, reached)
+            if problem.symmetric and not sp.issparse(problem.Q):
+                reached = yield from self._cones(problem, reached)
         random = np.random.default_rng(0)
         for restarts in count():
-            last = yield from self._proximal(problem, reached, ROUND * 2**restarts)
+            last = yield from self._proximal(problem, matrix, reached, ROUND * 2**restarts, Proximal.alpha)
             r = random.normal(size=problem.q.shape)
             r[:, 0] = np.abs(r[:, 0])
             r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
@@ -98,13 +114,30 @@ class Auto:
         return reached
 
     @staticmethod
-    def _proximal(problem: InterfaceProblem, start: Iterate, patience: int) -> Generator[Iterate, None, Iterate]:
-        """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last."""
-        equations = coulomb_equations(problem)
-        best, target, point = np.inf, np.inf, start
-        for done, point in enumerate(Proximal().iterate(problem, start), start=1):
+    def _interior(
+        problem: InterfaceProblem, matrix: Blocks, start: Iterate
+    ) -> Generator[Iterate, None, Iterate]:
+        """The interior-point method and a few proximal steps from its best point; returns the last or a better `start`."""
+        best, reached = np.inf, start
+        for point, error in interior_iterates(problem, matrix):
             yield point
-            best = min(best, equations.evaluate(*point)[0])
+            if error < best:
+                best, reached = error, point
+        if best < np.inf:
+            reached = yield from Auto._proximal(problem, matrix, reached, FEW, float(np.clip(best, NEAR, Proximal.alpha)))
+        evaluate = proximal_equations(problem, matrix).evaluate
+        return min(start, reached, key=lambda point: evaluate(*point)[0])
+
+    @staticmethod
+    def _proximal(
+        problem: InterfaceProblem, matrix: Blocks, start: Iterate, patience: int, alpha: float
+    ) -> Generator[Iterate, None, Iterate]:
+        """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last."""
+        equations, check = (proximal_equations(problem, matrix) for _ in range(2))
+        best, target, point = np.inf, np.inf, start
+        for done, point in enumerate(proximal_iterates(equations, start, alpha), start=1):
+            yield point
+            best = min(best, check.evaluate(*point)[0])
             if done % patience == 0:
                 if best > target:
                     break
