@@ -3,7 +3,7 @@
 With the cones K of forces and K* dual to them, De Saxce's form of Coulomb's law is
     r in K,   z = u + mu |u_t| n in K*,   r' z = 0  at each contact,   u = Q r + V lambda + q,   V' r + s = 0.
 In x = (mu r_n, r_t) and (z_n / mu, z_t) both cones are Lorentz's. Each iteration is one Newton step on z = u + mu |u_t| n
-with |u_t| linearised, the balance, and x o z = sigma (x'z / k) e in the scaling of Nesterov and Todd, predictor and
+with |u_t| linearised (where that led to a short step: as it is), the balance, and x o z = sigma (x'z / k) e in the scaling of Nesterov and Todd, predictor and
 corrector from one factorisation of Q + blocks, whose pattern is that of Q. It tells open, sticking and slipping contacts
 apart in few iterations where Newton's method cycles, and the null space of Q does not disturb it; the last digits are
 left to Newton's method. For Coulomb's law it is a method without a proof of convergence; it ends when it makes no
@@ -24,17 +24,25 @@ from contactopt.solving.kernels.sparse_blocks import Blocks, bordered
 
 SMOOTH, ROUGH = 1e-4, 1e3  # friction coefficients below and above which they count as none and as this
 ITERATIONS = 60
-NEAR = 1e-6  # complementarity and residual at which Newton's method does better
+NEAR = 1e-9  # complementarity and residual at which it ends
 CENTRAL = 1e-3  # least eigenvalue of x o z at a contact, over the mean
-BOUNDARY = 0.98  # of the way to the boundary of the cones
-STALLED = 8  # iterations without progress
+BOUNDARY, SHORT = 0.98, 0.9  # of the way to the boundary of the cones
+STALLED = 12  # iterations without progress
 RIDGE = 1e-10
+START = 100.0  # size of the first point in both cones, over dimensionless forces of order one
+STUCK = 0.3  # a step shorter than this is no Newton step; the next one leaves |u_t| as it is
 
 Iterate = tuple[np.ndarray, np.ndarray]
 
 
-def interior_iterates(problem: InterfaceProblem, matrix: Blocks) -> Iterator[tuple[Iterate, float]]:
-    """Points (r (k, dim), lambda (p,)) in the cones, of a dimensionless problem, and how far each is from a solution."""
+def interior_iterates(
+    problem: InterfaceProblem, matrix: Blocks, full: bool = False
+) -> Iterator[tuple[Iterate, float]]:
+    """Points (r (k, dim), lambda (p,)) in the cones, of a dimensionless problem, and how far each is from a solution.
+
+    full  |u_t| is linearised in every step, with shorter steps; else not after a step that had to be short. Either way
+          solves problems that the other does not.
+    """
     k, d = problem.q.shape
     mu = np.where(problem.mu < SMOOTH, 1.0, np.minimum(problem.mu, ROUGH))
     smooth = problem.mu < SMOOTH
@@ -44,8 +52,8 @@ def interior_iterates(problem: InterfaceProblem, matrix: Blocks) -> Iterator[tup
     kept[smooth, 1:] = False
     flat, V, p = kept.ravel(), problem.V, len(problem.s)
     x, z, lam = np.zeros((k, d)), np.zeros((k, d)), np.zeros(p)
-    x[:, 0] = z[:, 0] = 1.0
-    best, since = np.inf, 0
+    x[:, 0] = z[:, 0] = START
+    best, since, last = np.inf, 0, 1.0
     for _ in range(ITERATIONS):
         slip = np.sqrt(np.sum(z[:, 1:] ** 2, axis=1) + 1e-20)
         r = scale * x
@@ -61,8 +69,9 @@ def interior_iterates(problem: InterfaceProblem, matrix: Blocks) -> Iterator[tup
         if error < NEAR or since >= STALLED or not np.isfinite(error):
             return
         scaling = _Scaling(x, z)
+        bend = 1.0 if full or last > STUCK else 0.0
         shear = np.broadcast_to(np.eye(d), (k, d, d)).copy()
-        shear[:, 0, 1:] = np.where(smooth[:, None], 0.0, -z[:, 1:] / slip[:, None])
+        shear[:, 0, 1:] = np.where(smooth[:, None], 0.0, -bend * z[:, 1:] / slip[:, None])
         added = (shear @ scaling.F) / (scale[:, :, None] * scale[:, None, :]) + RIDGE * np.eye(d)
         solve = matrix.factor(None, added, flat)
         if solve is None:
@@ -84,18 +93,19 @@ def interior_iterates(problem: InterfaceProblem, matrix: Blocks) -> Iterator[tup
             return
         length = min(1.0, 0.99 * scaling.longest(first[0], first[1]))
         ahead = float(np.sum((x + length * first[0]) * (z + length * first[1]))) / k
-        centering = float(np.clip(np.clip(ahead / mean, 0.0, 1.0) ** 3, 1e-4, 0.95))
+        centering = float(np.clip(np.clip(ahead / mean, 0.0, 1.0) ** 3, 1e-4 if bend else 0.1, 0.95))
         second = scaling.corrector(first[0], first[1]) if length > 0.1 else 0.0
         step = direction(centering * mean * scaling.inverse - z - second)
         if step is None:
             return
-        length = min(1.0, BOUNDARY * scaling.longest(step[0], step[1]))
+        length = min(1.0, (SHORT if full else BOUNDARY) * scaling.longest(step[0], step[1]))
         least = np.minimum(CENTRAL, 0.5 * scaling.centrality / mean)
         for _ in range(30):
             new = x + length * step[0], z + length * step[1]
             if np.all(np.sqrt(np.maximum(_det(new[0]) * _det(new[1]), 0.0)) >= least * np.sum(new[0] * new[1]) / k):
                 break
             length *= 0.8
+        last = length
         x, z, lam = new[0], new[1], lam + length * step[2]
 
 

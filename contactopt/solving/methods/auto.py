@@ -31,7 +31,7 @@ from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equatio
 from contactopt.solving.methods import NATIVE, Iterate
 from contactopt.solving.methods.cone import AcaryCadoux
 from contactopt.solving.methods.newton import Newton
-from contactopt.solving.kernels.interior import NEAR, interior_iterates
+from contactopt.solving.kernels.interior import interior_iterates
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.solving.methods.proximal import Proximal, proximal_equations, proximal_iterates
 from contactopt.solving.preconditioners import find_preconditioner
@@ -40,6 +40,8 @@ LIMIT = 25  # Newton steps
 PATIENCE = 6  # of them without progress
 PROGRESS = 0.9  # a residual that falls by less is no progress
 CONES = 5  # cone programs
+CLOSE = 1e-3  # error of an interior point from which Newton's method finds the last digits
+LEAST = 1e-4  # weight of the first of them
 FEW = 10  # proximal steps for the last digits, each so many of which must halve the residual
 ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
 LARGER = 3.0  # random starts, over the root-mean-square force of the point left
@@ -67,9 +69,10 @@ class Auto:
             problem = problem.explicit()  # all that follows looks at the entries of Q
         matrix = block_matrix(problem.Q, problem.dim)
         if start is not None and sp.issparse(problem.Q):
-            reached = yield from self._proximal(problem, matrix, start, FEW, NEAR)
+            reached = yield from self._proximal(problem, matrix, start, FEW, LEAST)
         if not problem.bilateral:
-            reached = yield from self._interior(problem, matrix, reached)
+            for full in (False, True):
+                reached = yield from self._interior(problem, matrix, reached, full)
             if problem.symmetric and not sp.issparse(problem.Q):
                 reached = yield from self._cones(problem, reached)
         random = np.random.default_rng(0)
@@ -115,16 +118,20 @@ class Auto:
 
     @staticmethod
     def _interior(
-        problem: InterfaceProblem, matrix: Blocks, start: Iterate
+        problem: InterfaceProblem, matrix: Blocks, start: Iterate, full: bool
     ) -> Generator[Iterate, None, Iterate]:
-        """The interior-point method and a few proximal steps from its best point; returns the last or a better `start`."""
+        """The interior-point method and, where it came near to a solution, a few proximal steps for the last digits.
+
+        Returns the last point or a better `start`.
+        """
         best, reached = np.inf, start
-        for point, error in interior_iterates(problem, matrix):
+        for point, error in interior_iterates(problem, matrix, full):
             yield point
             if error < best:
                 best, reached = error, point
-        if best < np.inf:
-            reached = yield from Auto._proximal(problem, matrix, reached, FEW, float(np.clip(best, NEAR, Proximal.alpha)))
+        if best < CLOSE:
+            alpha = max(LEAST, 100 * best)
+            reached = yield from Auto._proximal(problem, matrix, reached, FEW, alpha)
         evaluate = proximal_equations(problem, matrix).evaluate
         return min(start, reached, key=lambda point: evaluate(*point)[0])
 
