@@ -5,12 +5,14 @@ Nothing here, or below in what it imports, knows finite elements.
 
 from contactopt.problem.certificate import balance_residual, fit_multipliers, natural_map_residual, siconos_residual
 from contactopt.problem.chart import Chart
+from contactopt.problem.feasibility import Infeasible, infeasibility
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.scaling import Scales, dimensionless
 from contactopt.problem.solution import Solution, Status
 
 __all__ = [
     "Chart",
+    "Infeasible",
     "InterfaceProblem",
     "Scales",
     "Solution",
@@ -18,6 +20,7 @@ __all__ = [
     "balance_residual",
     "dimensionless",
     "fit_multipliers",
+    "infeasibility",
     "natural_map_residual",
     "siconos_residual",
 ]

@@ -88,8 +88,6 @@ def natural_map_residual(
     w = problem.q + (problem.V @ lam).reshape(r.shape)
     u = d + w
     measure = yardsticks(problem, r, d, w)
-    if measure.force == 0:  # no force, nothing overlaps
-        return balance_residual(problem, r)
     y = r - measure.rho[:, None] * u
     errors = np.linalg.norm(r - coulomb_map(y, problem.mu, problem.bilateral)[0], axis=1)
     r_n, r_t = split(r)
@@ -123,6 +121,7 @@ def yardsticks(problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.nd
     mean = float(shares @ compliance / shares.sum()) if shares.any() else 0.0
     natural = max(length / mean if mean > 0 else 0.0, plate_force(problem))
     force = max(min(largest, natural), DUST * natural) if natural > 0 else largest
+    force = force or 1.0  # no force, and none that would make a displacement: any number serves
     if length == 0:
         return Yardsticks(force, 0.0, np.zeros(len(r)))
     stiff = np.clip(np.divide(mean, compliance, out=np.ones(len(r)), where=moves), 1.0, STIFFEST)

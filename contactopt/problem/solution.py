@@ -7,6 +7,8 @@ from enum import Enum
 
 import numpy as np
 
+from contactopt.problem.feasibility import Infeasible
+
 
 class Status(Enum):
     """How a solve ended: a word for tables and a sentence for people."""
@@ -18,6 +20,7 @@ class Status(Enum):
     CYCLING = "cycling", "the iteration came back to an earlier state, so it cannot converge; try relaxation"
     STALLED = "stalled", "the iterate no longer changes, but the certificate is above the tolerance"
     DIVERGED = "diverged", "the iterates grew without bound; the last finite one is kept"
+    INFEASIBLE = "infeasible", "the problem has no solution, and a ray proves it"
     BACKEND_FAILED = "backend_failed", "a QP or conic backend gave no usable answer"
 
     def __init__(self, label: str, sentence: str):
@@ -38,6 +41,7 @@ class Solution:
     history      one mapping per outer iteration: residual, change (of the tangential force), seconds and, where Q is an
                  operator, products, the method's products with Q so far
     seconds      phase -> time
+    proof        status `infeasible`: the ray that proves that there is no solution
     """
 
     reactions: np.ndarray
@@ -49,6 +53,7 @@ class Solution:
     history: tuple[dict[str, float], ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
     message: str = ""
+    proof: Infeasible | None = None
 
     @property
     def products(self) -> int:

@@ -12,12 +12,14 @@ import scipy.sparse as sp
 
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
-from contactopt.problem import InterfaceProblem, Scales, Solution, Status, dimensionless, natural_map_residual
+from contactopt.problem import InterfaceProblem, Scales, Solution, Status, dimensionless, infeasibility, natural_map_residual
 from contactopt.problem.operators import InterfaceOperator, loosened
 from contactopt.solving.methods import Method, default_method, find_method
 
 CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
+CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
+PROOF = 0.3, 5.0  # least and most seconds for the proof that a problem has no solution
 SAME = 1e-11  # relative distance at which two iterates are the same state
 CONFIRM = 8  # repeated states in a row after which a method is not going anywhere; some change course before that
 
@@ -45,7 +47,7 @@ def solve(
     start           a solution of a problem of the same size, to start from instead of cold
     progress        called with (iteration, residual) after each outer iteration
     Raises InputError on arguments that make no sense, an unknown or missing backend, or a load that pulls the bodies
-    apart. A backend that fails while solving is a status, with the last iterate.
+    apart. A problem that has no solution ends `infeasible`, with a proof, where one is found. A backend that fails while solving is a status, with the last iterate.
     """
     check_number("tol", tol, low=0.0)
     check_number("max_iterations", max_iterations, low=0.0)
@@ -85,6 +87,11 @@ def solve(
             break
     if status is not Status.SOLVED and recorder.residual <= tol:
         status = Status.SOLVED
+    proof = None
+    if status is not Status.SOLVED and recorder.residual > CLOSE:
+        proof = infeasibility(problem, float(np.clip(time_limit - recorder.clock, *PROOF)))
+        if proof is not None:
+            message, status = proof.sentence, Status.INFEASIBLE
     return Solution(
         recorder.reactions,
         recorder.multipliers,
@@ -95,6 +102,7 @@ def solve(
         tuple(recorder.history),
         {"solve": recorder.clock},
         message or status.sentence,
+        proof,
     )
 
 

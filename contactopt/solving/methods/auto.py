@@ -5,6 +5,7 @@
 2. The interior-point method (contactopt.solving.kernels.interior), which no cycle and no rank deficiency of Q disturbs,
    and a few steps of the proximal loop for the last digits. They need no symmetric Q and no backend.
 3. Where these fail and Q is a symmetric array: CONES iterations of the Acary-Cadoux fixed point, convex programs.
+   Where that fails too, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
 4. The proximal loop from the best of these points.
 5. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
    contact forces drawn at random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
@@ -24,7 +25,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.errors import BackendError
-from contactopt.problem import InterfaceProblem
+from contactopt.problem import InterfaceProblem, infeasibility
 from contactopt.problem.cones import coulomb_cone
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations
@@ -75,6 +76,8 @@ class Auto:
                 reached = yield from self._interior(problem, matrix, reached, full)
             if problem.symmetric and not sp.issparse(problem.Q):
                 reached = yield from self._cones(problem, reached)
+        if infeasibility(problem) is not None:  # the driver says so
+            return
         random = np.random.default_rng(0)
         for restarts in count():
             last = yield from self._proximal(problem, matrix, reached, ROUND * 2**restarts, Proximal.alpha)
