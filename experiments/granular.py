@@ -24,7 +24,9 @@ def packing(
     """
     rng = np.random.default_rng(seed)
     side = int(np.ceil(bodies ** (1 / dim)))
-    grid = np.stack(np.meshgrid(*[np.arange(side, dtype=float)] * dim, indexing="ij"), axis=-1).reshape(-1, dim)[:bodies]
+    grid = np.stack(np.meshgrid(*[np.arange(side, dtype=float)] * dim, indexing="ij"), axis=-1).reshape(-1, dim)[
+        :bodies
+    ]
     places = grid + disorder * rng.uniform(-0.5, 0.5, grid.shape)
     pairs = _pairs(places, 1.5)
     fixed = places[:, -1] < 0.5

@@ -152,13 +152,19 @@ def judge(seed: int) -> tuple[str, str, str]:
         answer = solve(problem, method, tol=TOL, max_iterations=100, time_limit=1.0)
     except ValueError:  # the load pulls the bodies apart
         return name, "refused", ""
-    if answer.status.label == "infeasible" and case["feasible"] is None and name in ("plain", "null_space", "distant", "uneven"):
+    if (
+        answer.status.label == "infeasible"
+        and case["feasible"] is None
+        and name in ("plain", "null_space", "distant", "uneven")
+    ):
         return name, "infeasible", "called infeasible although a solution exists"
     if not answer.solved:
         return name, str(answer.status), ""
     if case["feasible"] is False:
         return name, "solved", "there is no solution"
-    found = violations(dense(problem.Q), problem.q, problem.mu, problem.V, problem.s, answer.reactions, answer.multipliers)
+    found = violations(
+        dense(problem.Q), problem.q, problem.mu, problem.V, problem.s, answer.reactions, answer.multipliers
+    )
     worst = max(found, key=lambda key: found[key])
     if found[worst] > SLACK * TOL:
         return name, "solved", f"{worst} {found[worst]:.1e}"

@@ -20,7 +20,9 @@ def test_every_problem_of_the_collection_is_certified(path):
     tol = 1e-12 if path.name.startswith(FULL_RANK) else 1e-8
     solution = solve(problem, tol=tol)
     assert solution.solved, solution.message
-    assert siconos_residual(problem, solution.reactions, solution.multipliers) <= 1e-8  # the published measure, its own units
+    assert (
+        siconos_residual(problem, solution.reactions, solution.multipliers) <= 1e-8
+    )  # the published measure, its own units
     u = problem.displacements(solution.reactions, solution.multipliers)
     r_n, r_t = solution.reactions[:, 0], np.linalg.norm(solution.reactions[:, 1:], axis=1)
     assert np.all(r_t <= problem.mu * r_n + 1e-6 * np.abs(solution.reactions).max())

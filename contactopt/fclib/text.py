@@ -15,6 +15,7 @@ import scipy.sparse as sp
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
+from contactopt.problem.operators import Interface
 
 DENSE, BLOCKS, SPARSE = range(3)  # storages
 MOSTLY = 1 / 3  # share of entries from which on a matrix is kept as an array
@@ -50,7 +51,9 @@ def read_text(path: Path) -> InterfaceProblem:
     if dim not in (2, 3):
         raise InputError(f"its dimension is {dim}, not 2 or 3")
     if contacts < 0 or rows != dim * contacts or columns != rows:
-        raise InputError(f"its matrix is {rows} by {columns}, which does not fit {contacts} contacts in {dim} dimensions")
+        raise InputError(
+            f"its matrix is {rows} by {columns}, which does not fit {contacts} contacts in {dim} dimensions"
+        )
     rest = head[5] if len(head) > 5 else ""
     if storage == SPARSE:
         W, numbers = _listing(rest, rows)
@@ -63,7 +66,7 @@ def read_text(path: Path) -> InterfaceProblem:
     return InterfaceProblem(compact(W), q, numbers.floats(contacts))
 
 
-def compact(W: sp.csr_array | np.ndarray) -> sp.csr_array | np.ndarray:
+def compact(W: Interface) -> Interface:
     """The matrix as an array if more than a third of its entries are there, else as it is."""
     full = sp.issparse(W) and W.nnz >= MOSTLY * W.shape[0] * W.shape[1]
     return np.asarray(W.toarray()) if full else W
@@ -119,20 +122,22 @@ def _listing(text: str, n: int) -> tuple[sp.csr_array, _Numbers]:
     if size != [n, n] or not 0 <= count <= len(text) // 4:
         raise InputError(f"its sparse matrix announces {size[0]} by {size[1]} with {count} entries, which does not fit")
     listed = "triplet" in line
-    i, j, x = [], [], []
+    entries: list[tuple[int, int, float]] = []
     column = -1
-    while len(x) < count:
+    while len(entries) < count:
         words = next(lines, "end").replace(":", " ").split()
         if words[:1] == ["col"]:
             column = int(words[1])
         elif listed and len(words) == 3:
-            i.append(int(words[0])), j.append(int(words[1])), x.append(float(words[2]))
+            entries.append((int(words[0]), int(words[1]), float(words[2])))
         elif not listed and len(words) == 2 and column >= 0:
-            i.append(int(words[0])), j.append(column), x.append(float(words[1]))
+            entries.append((int(words[0]), column, float(words[1])))
         elif words:
             raise InputError("its sparse matrix has fewer entries than it announces, or a line that is none")
     rest = [line for line in islice(lines, None)]
     while rest and (rest[0].lstrip().startswith("col") or not rest[0].strip()):  # empty columns at the end
         rest.pop(0)
-    matrix = sp.coo_array((np.array(x), (np.array(i, dtype=int), np.array(j, dtype=int))), shape=(n, n))
+    i, j, x = zip(*entries) if entries else ((), (), ())
+    where = np.array(i, dtype=int), np.array(j, dtype=int)
+    matrix = sp.coo_array((np.array(x, dtype=float), where), shape=(n, n))
     return sp.csr_array(matrix), _Numbers(" ".join(rest).split())

@@ -163,12 +163,12 @@ def balance_residual(problem: InterfaceProblem, reactions: np.ndarray, force: fl
         force = float(np.linalg.norm(r, axis=1).max(initial=0.0))
     error = np.abs(problem.V.T @ r.ravel() + problem.s)
     size = np.maximum(np.abs(problem.s), np.abs(problem.V).max(axis=0, initial=0.0) * force)
-    return float(np.max(np.where(error > 0, np.divide(error, size, out=np.full_like(error, np.inf), where=size > 0), 0)))
+    return float(
+        np.max(np.where(error > 0, np.divide(error, size, out=np.full_like(error, np.inf), where=size > 0), 0))
+    )
 
 
-def siconos_residual(
-    problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray | None = None
-) -> float:
+def siconos_residual(problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray | None = None) -> float:
     """The measure that Siconos and the FCLib collection compare methods by; for comparison, not for a verdict.
 
     With K the product of the friction cones it is |r - proj_K(r - (u + mu |u_t| n))| / max(|q|, |r|, |u|), where

@@ -173,7 +173,7 @@ def _polished(
 
 def _sentence(problem: InterfaceProblem, weights: np.ndarray) -> str:
     largest = float(weights.max(initial=0.0))
-    contacts = np.flatnonzero(weights > 1e-6 * largest) if largest > 0 else []
+    contacts: list[int] = np.flatnonzero(weights > 1e-6 * largest).tolist() if largest > 0 else []
     if len(contacts) == 0:
         return "no forces of the contacts can balance the load on the plate, so there is no solution; change the load."
     listed = ", ".join(map(str, contacts[:8])) + (", ..." if len(contacts) > 8 else "")

@@ -8,6 +8,7 @@ and an InterfaceOperator.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -110,7 +111,7 @@ class InterfaceOperator(LinearOperator):
         return part
 
 
-Interface = np.ndarray | sp.csr_array | InterfaceOperator
+Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or InterfaceOperator
 
 
 def sparse(Q: object) -> sp.csr_array:

@@ -12,7 +12,15 @@ import scipy.sparse as sp
 
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
-from contactopt.problem import InterfaceProblem, Scales, Solution, Status, dimensionless, infeasibility, natural_map_residual
+from contactopt.problem import (
+    InterfaceProblem,
+    Scales,
+    Solution,
+    Status,
+    dimensionless,
+    infeasibility,
+    natural_map_residual,
+)
 from contactopt.problem.operators import InterfaceOperator, loosened
 from contactopt.solving.methods import Method, default_method, find_method
 
@@ -60,6 +68,11 @@ def solve(
             f"settings {', '.join(settings)} belong to a method given by name; set them on the method object."
         )
     _check_equilibrium(problem)
+    if not problem.symmetric and not getattr(method, "unsymmetric", False):
+        name = type(method).__name__.lower()
+        raise InputError(
+            f"method '{name}' minimises an energy, which an unsymmetric Q does not have; use auto or proximal."
+        )
     if not getattr(method, "sparse" if sp.issparse(problem.Q) else "implicit", False):
         problem = problem.explicit()
     scaled, scales = dimensionless(problem)

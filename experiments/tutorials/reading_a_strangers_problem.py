@@ -16,7 +16,17 @@ import h5py
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import InputError, InterfaceProblem, diagnose, fclib, natural_map_residual, siconos_residual, reduce, scenes, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    diagnose,
+    fclib,
+    natural_map_residual,
+    reduce,
+    scenes,
+    siconos_residual,
+    solve,
+)
 
 folder = TemporaryDirectory()
 

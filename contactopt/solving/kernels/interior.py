@@ -15,12 +15,13 @@ interior point algorithm; Nesterov, Todd (1997); Mehrotra (1992) for the correct
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import coulomb_cone
-from contactopt.solving.kernels.sparse_blocks import Blocks, bordered
+from contactopt.solving.kernels.sparse_blocks import Blocks, Solver, bordered
 
 SMOOTH, ROUGH = 1e-4, 1e3  # friction coefficients below and above which they count as none and as this
 ITERATIONS = 60
@@ -35,9 +36,7 @@ STUCK = 0.3  # a step shorter than this is no Newton step; the next one leaves |
 Iterate = tuple[np.ndarray, np.ndarray]
 
 
-def interior_iterates(
-    problem: InterfaceProblem, matrix: Blocks, full: bool = False
-) -> Iterator[tuple[Iterate, float]]:
+def interior_iterates(problem: InterfaceProblem, matrix: Blocks, full: bool = False) -> Iterator[tuple[Iterate, float]]:
     """Points (r (k, dim), lambda (p,)) in the cones, of a dimensionless problem, and how far each is from a solution.
 
     full  |u_t| is linearised in every step, with shorter steps; else not after a step that had to be short. Either way
@@ -77,17 +76,7 @@ def interior_iterates(
         if solve is None:
             return
 
-        def direction(target: np.ndarray):  # type: ignore[no-untyped-def]
-            """dx, dz, dlambda with F dx + dz = target and the linearised equations."""
-            right = ((_times(shear, target) - gap) / scale).ravel()[flat]
-            answer = bordered(solve, right, V[flat], V[flat], -unbalanced)
-            if answer is None:
-                return None
-            dr = np.zeros(k * d)
-            dr[flat] = answer[0]
-            dx = dr.reshape(k, d) / scale
-            return dx, np.where(kept, target - _times(scaling.F, dx), 0.0), answer[1]
-
+        direction = partial(_direction, solve, scaling, shear, gap, scale, kept, V, unbalanced)
         first = direction(-z)
         if first is None:
             return
@@ -107,6 +96,29 @@ def interior_iterates(
             length *= 0.8
         last = length
         x, z, lam = new[0], new[1], lam + length * step[2]
+
+
+def _direction(
+    solve: Solver,
+    scaling: _Scaling,
+    shear: np.ndarray,
+    gap: np.ndarray,
+    scale: np.ndarray,
+    kept: np.ndarray,
+    V: np.ndarray,
+    unbalanced: np.ndarray,
+    target: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """dx, dz (k, d) and dlambda (p,) with F dx + dz = target and the linearised equations; None if there are none."""
+    flat = kept.ravel()
+    right = ((_times(shear, target) - gap) / scale).ravel()[flat]
+    answer = bordered(solve, right, V[flat], V[flat], -unbalanced)
+    if answer is None:
+        return None
+    dr = np.zeros(kept.size)
+    dr[flat] = answer[0]
+    dx = dr.reshape(kept.shape) / scale
+    return dx, np.where(kept, target - _times(scaling.F, dx), 0.0), answer[1]
 
 
 class _Scaling:

@@ -16,6 +16,8 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from contactopt.problem.operators import Interface
+
 PIVOT = 0.01  # a diagonal entry this much smaller than the largest of its column is still a pivot
 SMALL = 60  # unknowns up to which LAPACK on an array is faster than a sparse factorisation
 FULL = 0.5  # share of entries from which on it is faster at any size
@@ -110,7 +112,7 @@ class SparseBlocks:
 Blocks = DenseBlocks | SparseBlocks
 
 
-def block_matrix(Q: np.ndarray | sp.csr_array, d: int) -> Blocks:
+def block_matrix(Q: Interface, d: int) -> Blocks:
     """Q for block systems: sparse where that is faster than LAPACK on an array."""
     if not sp.issparse(Q):
         return DenseBlocks(Q, d)

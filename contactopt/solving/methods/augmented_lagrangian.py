@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -38,6 +39,7 @@ class AugmentedLagrangian:
 
     rho: float = 100.0
     explicit: bool = False
+    unsymmetric: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_number("the penalty rho", self.rho, low=0.0)

@@ -29,11 +29,11 @@ from contactopt.problem import InterfaceProblem, infeasibility
 from contactopt.problem.cones import coulomb_cone
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations
+from contactopt.solving.kernels.interior import interior_iterates
+from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.solving.methods import NATIVE, Iterate
 from contactopt.solving.methods.cone import AcaryCadoux
 from contactopt.solving.methods.newton import Newton
-from contactopt.solving.kernels.interior import interior_iterates
-from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.solving.methods.proximal import Proximal, proximal_equations, proximal_iterates
 from contactopt.solving.preconditioners import find_preconditioner
 
@@ -55,6 +55,7 @@ class Auto:
     preconditioner: str | None = None
     implicit: ClassVar[bool] = True
     sparse: ClassVar[bool] = True
+    unsymmetric: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         find_preconditioner(self.preconditioner)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,6 +31,8 @@ PIVOT, TIE = 1e-10, 1e-12  # least pivot; relative distance of equal ratios
 @dataclass(frozen=True)
 class Lemke:
     """No settings. InputError in 3D, for bilateral contact and for more than 300 contacts."""
+
+    unsymmetric: ClassVar[bool] = True
 
     def backends(self, dim: int) -> tuple[str, str]:
         if dim != 2:

@@ -36,6 +36,7 @@ class Proximal:
 
     alpha: float = 1e-3
     sparse: ClassVar[bool] = True  # takes a sparse Q
+    unsymmetric: ClassVar[bool] = True  # and one that is not symmetric
 
     def __post_init__(self) -> None:
         check_number("alpha", self.alpha, low=0.0)
