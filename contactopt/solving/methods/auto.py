@@ -73,7 +73,7 @@ class Auto:
         if start is not None and sp.issparse(problem.Q):
             reached = yield from self._proximal(problem, matrix, start, FEW, LEAST)
         if not problem.bilateral:
-            for full in (False, True):
+            for full in (True, False):
                 reached = yield from self._interior(problem, matrix, reached, full)
             if problem.symmetric and not sp.issparse(problem.Q):
                 reached = yield from self._cones(problem, reached)
