@@ -137,7 +137,8 @@ class _Recorder:
         self.reactions, self.multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
         self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
         self.history: list[dict[str, float]] = []
-        self.recent: list[np.ndarray] = [self.reactions]
+        self.previous = self.reactions
+        self.recent: list[np.ndarray] = [np.zeros(problem.q.size + len(problem.s))]
         self.clock = 0.0
         self.repeated = 0
 
@@ -155,9 +156,11 @@ class _Recorder:
         self.clock += seconds
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)
         self.residual = self._certificate()
-        change = _relative(self.reactions[:, 1:], self.recent[-1][:, 1:])
-        repeats = [m for m, old in enumerate(reversed(self.recent), 1) if _relative(self.reactions, old) < SAME]
-        self.recent = [*self.recent[1 - CYCLE :], self.reactions]
+        change = _relative(self.reactions[:, 1:], self.previous[:, 1:])
+        self.previous = self.reactions
+        state = np.concatenate([r.ravel(), lam])
+        repeats = [m for m, old in enumerate(reversed(self.recent), 1) if _relative(state, old) < SAME]
+        self.recent = [*self.recent[1 - CYCLE :], state]
         self.history.append({"residual": self.residual, "change": change, "seconds": self.clock} | counts)
         if self.progress is not None:
             self.progress(len(self.history), self.residual)
