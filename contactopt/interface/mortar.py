@@ -1,6 +1,6 @@
 """Mortar coupling of two surfaces whose nodes do not match, with dual multipliers.
 
-One side, the finer one unless told otherwise, carries the contacts. Its linear cells (contactopt.interface.surfaces) have
+One side, the finer one unless told otherwise, carries the contacts. Its linear cells (contactopt.interface.faces) have
 hat functions phi_i; on the part G of every cell that the other side covers,
 
     a_i = int_G phi_i,    psi_i linear on the cell,    int_G psi_i phi_j = delta_ij a_i,
@@ -57,10 +57,11 @@ from scipy.spatial import KDTree
 from contactopt.bodies.elements import FACES
 from contactopt.errors import InputError
 from contactopt.interface.segments import Overlap, overlap
-from contactopt.interface.surfaces import Surface, cross
+from contactopt.interface.faces import Faces, cross
 
 SLIVER = 1e-8  # directions in which a covered part extends less than the square root of this: fields are constant there
 LEVER = 1 / 8  # of the size of a contact's cells: larger gaps are levers of the geometry, not of the faces
+ROUNDING = 1e-11  # shorter levers, over the size of faces, are rounding
 BLOCK = 200_000  # points of integration at a time
 OVERLAP = 1e-9  # initial overlap, over the extent of the contact surface, that is reported
 
@@ -114,7 +115,7 @@ class Mortar:
         return G
 
 
-def mortar(upper: Surface, lower: Surface, own: str | None = None) -> Mortar:
+def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     """Contacts between two surfaces.
 
     own  'upper' or 'lower': the body that carries the contacts; None: the one with more contacts where they face each other
@@ -149,12 +150,12 @@ def mortar(upper: Surface, lower: Surface, own: str | None = None) -> Mortar:
     )
 
 
-def _contacts(surface: Surface, faces: np.ndarray) -> int:
+def _contacts(surface: Faces, faces: np.ndarray) -> int:
     """Number of contacts on some faces of a surface."""
     return len(np.unique(surface.faces[np.unique(faces)][:, surface.cells]))
 
 
-def contact_normals(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
     """Outward unit normals (dim, n), integrals of hat functions times normals, at contact nodes; sizes (n,) of the cells."""
     from skfem.quadrature import get_quadrature
 
@@ -179,7 +180,7 @@ def contact_normals(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     return normals, area ** (1 / (surface.dim - 1)) / len(surface.cells)
 
 
-def _integrate(own: Surface, other: Surface, points: Overlap) -> tuple[np.ndarray, ...]:
+def _integrate(own: Faces, other: Faces, points: Overlap) -> tuple[np.ndarray, ...]:
     """Contact nodes (k,), areas, weights on both sides, and the weighted vector (dim, k) from the other true surface."""
     count = own.cells.shape[1]
     used, cell = np.unique(points.cell, return_inverse=True)
@@ -252,7 +253,7 @@ def _clean(W: sp.csr_matrix) -> sp.csr_matrix:
     return W
 
 
-def _alone(own: Surface, other: Surface, points: Overlap, nodes: np.ndarray) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+def _alone(own: Faces, other: Faces, points: Overlap, nodes: np.ndarray) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """The own node of every contact, and the shape functions of the other side at the place that faces it."""
     k = len(nodes)
     mine = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), (k, own.points.shape[1]))
@@ -270,11 +271,11 @@ def _alone(own: Surface, other: Surface, points: Overlap, nodes: np.ndarray) -> 
 def _lever(e: np.ndarray, up: np.ndarray, gap: np.ndarray, limit: np.ndarray) -> np.ndarray:
     """l (dim, k): the part of e that is no gap, and of the gap at most `limit`; `up` are normals along which it opens."""
     lever = e - up * (gap - np.clip(gap, -limit, limit))
-    scale = 1e-12 * max(limit.max() / LEVER, np.abs(e).max())
+    scale = ROUNDING * max(limit.max() / LEVER, np.abs(e).max())
     return np.asarray(np.where(np.linalg.norm(lever, axis=0) > scale, lever, 0.0))
 
 
-def _around(own: Surface, nodes: np.ndarray) -> sp.csr_matrix:
+def _around(own: Faces, nodes: np.ndarray) -> sp.csr_matrix:
     """(k, n) areas of the faces that contact and node have in common."""
     f, size = len(own.faces), own.points.shape[1]
     corners = own.points[:, own.faces[:, : own.corners]]
@@ -311,7 +312,7 @@ def rotations(around: sp.csr_matrix, points: np.ndarray, lever: np.ndarray) -> l
     return [[sp.csr_matrix((values[:, c, d], (i, j)), around.shape) for d in range(dim)] for c in range(dim)]
 
 
-def _report_overlap(gap: np.ndarray, points: np.ndarray, pair: tuple[Surface, Surface]) -> None:
+def _report_overlap(gap: np.ndarray, points: np.ndarray, pair: tuple[Faces, Faces]) -> None:
     worst = int(np.argmin(gap))
     if gap[worst] < -OVERLAP * np.ptp(points, axis=1).max():
         where = ", ".join(f"{c:.4g}" for c in points[:, worst])

@@ -25,7 +25,7 @@ from skfem.refdom import RefLine, RefTri
 
 from contactopt.bodies.elements import weight_at
 from contactopt.errors import InputError
-from contactopt.interface.surfaces import Surface, cross, patches
+from contactopt.interface.faces import Faces, cross, patches
 
 SMALLEST = 1e-8  # cells that are covered by less than this fraction count as uncovered: the noise of coordinates
 FACING = -0.1  # the cosine between normals of faces that face each other is below this
@@ -53,7 +53,7 @@ class Overlap:
     measure: np.ndarray
 
 
-def overlap(own: Surface, other: Surface, normals: np.ndarray) -> Overlap:
+def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     """Overlap of two surfaces; `normals` (dim, n) are those of the own side at its nodes.
 
     Raises InputError if the other surface is folded, so that some cell faces two of its layers.
@@ -88,7 +88,7 @@ def neighbours(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray
     return first[order], second[order]
 
 
-def _pieces(surface: Surface, own: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _pieces(surface: Faces, own: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Polygons of a surface: vertices (dim, p, v), reference coordinates (dim - 1, p, v), faces (p,), cells (p,)."""
     local, cell = patches(surface, own)
     count = len(surface.faces)
@@ -98,7 +98,7 @@ def _pieces(surface: Surface, own: bool) -> tuple[np.ndarray, np.ndarray, np.nda
     return vertices, at, face, face * len(surface.cells) + np.tile(cell, count)
 
 
-def _facing(own: Surface, other: Surface) -> tuple[np.ndarray, ...]:
+def _facing(own: Faces, other: Faces) -> tuple[np.ndarray, ...]:
     """Pairs of polygons that may face each other, the polygons of both sides, and the outward normals of the own ones."""
     sides = [_pieces(own, True), _pieces(other, False)]
     centres = [x.mean(axis=2) for x, *_ in sides]
@@ -121,7 +121,7 @@ def _polygon_normals(x: np.ndarray) -> np.ndarray:
     return np.asarray(normal / np.linalg.norm(normal, axis=0))
 
 
-def _lines(own: Surface, other: Surface, normals: np.ndarray) -> Overlap:
+def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     first, second, mine, theirs, _ = _facing(own, other)
     vertices, at, face, cell = mine
     start, width = at[:, first, 0], at[:, first, 1] - at[:, first, 0]
@@ -150,7 +150,7 @@ def _lines(own: Surface, other: Surface, normals: np.ndarray) -> Overlap:
 
 
 def _project(
-    own: Surface,
+    own: Faces,
     face: np.ndarray,
     start: np.ndarray,
     width: np.ndarray,
@@ -175,7 +175,7 @@ def _project(
     return s
 
 
-def _check_fold(other: Surface, vertices: np.ndarray, cell: np.ndarray, covered: np.ndarray) -> None:
+def _check_fold(other: Faces, vertices: np.ndarray, cell: np.ndarray, covered: np.ndarray) -> None:
     if covered.max(initial=0.0) > FOLD:
         where = vertices[:, np.argmax(cell == np.argmax(covered))].mean(axis=1)
         raise InputError(
@@ -184,7 +184,7 @@ def _check_fold(other: Surface, vertices: np.ndarray, cell: np.ndarray, covered:
         )
 
 
-def _polygons(own: Surface, other: Surface) -> Overlap:
+def _polygons(own: Faces, other: Faces) -> Overlap:
     first, second, mine, theirs, outward = _facing(own, other)
     vertices, at, face, cell = mine
     origin = vertices.mean(axis=2)
@@ -227,10 +227,10 @@ def _polygons(own: Surface, other: Surface) -> Overlap:
     return Overlap(cell[mine_at], here, theirs[2][theirs_at], there, E, measure)
 
 
-def _order(own: Surface, other: Surface) -> int:
+def _order(own: Faces, other: Faces) -> int:
     """Degree of the quadrature on triangles: exact for products of hat functions and shape functions on affine faces."""
 
-    def highest(surface: Surface) -> int:
+    def highest(surface: Faces) -> int:
         return surface.degree * (2 if surface.corners == 4 else 1)
 
     hats = 2 if own.corners == 4 else 1

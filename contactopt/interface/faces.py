@@ -31,7 +31,7 @@ NEWTON, STEPS = 1e-13, 30  # accuracy of a place on a face, in its own coordinat
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class Faces:
     """The candidate contact boundary of one body.
 
     name    of the body
@@ -138,15 +138,15 @@ def evaluate(element: skfem.Element, at: np.ndarray) -> tuple[np.ndarray, np.nda
     return value, np.stack([np.broadcast_to(np.asarray(s).reshape(len(at), -1), at.shape) for _, s in values])
 
 
-def surface_of(body: Body, part: Part) -> Surface:
+def faces_of(body: Body, part: Part) -> Faces:
     """The contact boundary of a discretised Part."""
     faces, normals = face_nodes(body.basis, body.degree, np.asarray(body.basis.mesh.boundaries[part.contact]))
     kind = body.basis.mesh.refdom.__name__
-    surface = Surface(body.name, kind, body.degree, body.locations, faces, np.ones(len(faces)), body.weight, part.curve)
+    surface = Faces(body.name, kind, body.degree, body.locations, faces, np.ones(len(faces)), body.weight, part.curve)
     return replace(surface, turn=np.sign(np.sum(face_normals(surface) * normals, axis=0)))
 
 
-def face_normals(surface: Surface) -> np.ndarray:
+def face_normals(surface: Faces) -> np.ndarray:
     """(dim, f) unit normals at the middle of every face, outward."""
     middle = surface.places[:, : surface.corners].mean(axis=1)
     count = len(surface.faces)
@@ -162,7 +162,7 @@ def cross(tangents: np.ndarray) -> np.ndarray:
     return np.cross(tangents[:, 0], tangents[:, 1], axis=0)
 
 
-def patches(surface: Surface, own: bool) -> tuple[np.ndarray, np.ndarray]:
+def patches(surface: Faces, own: bool) -> tuple[np.ndarray, np.ndarray]:
     """Polygons that stand for a face when surfaces are cut: their vertices among its nodes (p, v), their cell (p,).
 
     Those of the side with the multipliers never reach over two of its cells.
