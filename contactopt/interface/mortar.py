@@ -53,11 +53,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import KDTree
+from skfem.quadrature import get_quadrature
 
 from contactopt.bodies.elements import FACES
 from contactopt.errors import InputError
 from contactopt.interface.segments import Overlap, overlap
-from contactopt.interface.faces import Faces, cross
+from contactopt.interface.faces import Faces, cross, evaluate
 
 SLIVER = 1e-8  # directions in which a covered part extends less than the square root of this: fields are constant there
 LEVER = 1 / 8  # of the size of a contact's cells: larger gaps are levers of the geometry, not of the faces
@@ -136,13 +137,13 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
             f"the contact boundaries of body '{upper.name}' and body '{lower.name}' face each other nowhere; "
             "check the boundaries' names, the bodies' positions, and which of them is the upper one."
         )
-    nodes, areas, W, W_other, apart = _integrate(mine, theirs, points)
+    nodes, areas, W, W_other, apart, least = _integrate(mine, theirs, points)
     n = sign * normals[:, nodes]
     gap = -sign * np.sum(n * apart, axis=0)
     alone, alone_other = _alone(mine, theirs, points, nodes)
     e = W @ mine.points.T - W_other @ theirs.points.T
     lever = np.zeros_like(n) if mine.weight[1] else _lever(e.T, -sign * n, gap, LEVER * sizes[nodes])
-    _report_overlap(gap, mine.points[:, nodes], pair)
+    _report_overlap(least, np.ptp(mine.points[:, nodes], axis=1).max(), pair)
     sides = [(W, alone), (W_other, alone_other)]
     (W0, alone0), (W1, alone1) = sides if first == 0 else sides[::-1]
     return Mortar(
@@ -157,14 +158,12 @@ def _contacts(surface: Faces, faces: np.ndarray) -> int:
 
 def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
     """Outward unit normals (dim, n), integrals of hat functions times normals, at contact nodes; sizes (n,) of the cells."""
-    from skfem.quadrature import get_quadrature
-
     n, count = surface.points.shape[1], len(surface.faces)
     total, area = np.zeros(surface.points.shape), np.zeros(n)
     reference, hat = FACES[surface.kind][:2]
     at, share = get_quadrature(reference, 4)
-    phi = np.stack([hat.lbasis(at, v)[0] for v in range(surface.cells.shape[1])])
-    phi = np.broadcast_to(phi, (len(phi), at.shape[1]))
+    phi = evaluate(hat, at)[0]
+    share = share / len(surface.cells)  # of the reference face
     for cell in surface.cells:
         places = np.tile(surface.places[:, cell] @ phi, count)
         face = np.repeat(np.arange(count), at.shape[1])
@@ -177,11 +176,15 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
             for d in range(len(total)):
                 total[d] += np.bincount(node, split[d] @ (phi[v] * share), n)
     normals = np.divide(total, np.linalg.norm(total, axis=0), where=area > 0, out=np.zeros_like(total))
-    return normals, area ** (1 / (surface.dim - 1)) / len(surface.cells)
+    return normals, area ** (1 / (surface.dim - 1))
 
 
 def _integrate(own: Faces, other: Faces, points: Overlap) -> tuple[np.ndarray, ...]:
-    """Contact nodes (k,), areas, weights on both sides, and the weighted vector (dim, k) from the other true surface."""
+    """Contacts and their integrals.
+
+    Returns nodes (k,), areas (k,), weights on both sides, the weighted vector (dim, k) from the other true surface to the
+    own one, and the least distance of the true surfaces at a point of integration with this point.
+    """
     count = own.cells.shape[1]
     used, cell = np.unique(points.cell, return_inverse=True)
     face, local = used // len(own.cells), used % len(own.cells)
@@ -209,6 +212,7 @@ def _integrate(own: Faces, other: Faces, points: Overlap) -> tuple[np.ndarray, .
     W = sp.csr_matrix((len(nodes), own.points.shape[1]))
     W_other = sp.csr_matrix((len(nodes), other.points.shape[1]))
     apart = np.zeros((own.dim, len(nodes)))
+    least, deepest = np.inf, np.zeros(own.dim)
     for start in range(0, len(cell), BLOCK):
         block = slice(start, start + BLOCK)
         row = rows[cell[block]]
@@ -221,11 +225,21 @@ def _integrate(own: Faces, other: Faces, points: Overlap) -> tuple[np.ndarray, .
             else:
                 W_other = W_other + term
             places.append(surface.true(surface.locations(faces[block], at[:, block])[0]))
+        distance = -np.sum((places[0] - places[1]) * _unit_normals(own, points, block), axis=0)
+        if distance.min() < least:
+            least, deepest = float(distance.min()), places[0][:, np.argmin(distance)]
         vector = functional(places[0] - places[1], block)
         for d in range(own.dim):
             apart[d] += np.bincount(row.ravel(), vector[:, :, d].ravel(), len(nodes))
     scale = sp.diags(1 / areas)
-    return nodes, areas, _clean(scale @ W), _clean(scale @ W_other), apart / areas
+    return nodes, areas, _clean(scale @ W), _clean(scale @ W_other), apart / areas, (least, deepest)
+
+
+def _unit_normals(own: Faces, points: Overlap, block: slice) -> np.ndarray:
+    """(dim, g) outward unit normals of the own faces at points of integration."""
+    face = points.cell[block] // len(own.cells)
+    normal = cross(own.locations(face, points.at[:, block])[1]) * own.turn[face]
+    return np.asarray(normal / np.linalg.norm(normal, axis=0))
 
 
 def _slopes(mass: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray:
@@ -312,15 +326,10 @@ def rotations(around: sp.csr_matrix, points: np.ndarray, lever: np.ndarray) -> l
     return [[sp.csr_matrix((values[:, c, d], (i, j)), around.shape) for d in range(dim)] for c in range(dim)]
 
 
-def _report_overlap(gap: np.ndarray, points: np.ndarray, pair: tuple[Faces, Faces]) -> None:
-    worst = int(np.argmin(gap))
-    if gap[worst] < -OVERLAP * np.ptp(points, axis=1).max():
-        where = ", ".join(f"{c:.4g}" for c in points[:, worst])
+def _report_overlap(least: tuple[float, np.ndarray], extent: float, pair: tuple[Faces, Faces]) -> None:
+    distance, place = least
+    if distance < -OVERLAP * extent:
+        where = ", ".join(f"{c:.4g}" for c in place)
         _log.warning(
-            "bodies '%s' and '%s' overlap initially at %d of %d contacts, by up to %.3g at (%s)",
-            *(s.name for s in pair),
-            np.sum(gap < 0),
-            len(gap),
-            -gap[worst],
-            where,
+            "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)", *(s.name for s in pair), -distance, where
         )
