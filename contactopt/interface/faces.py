@@ -107,8 +107,12 @@ class Faces:
         """Places (dim, m) on faces (m,) at reference coordinates (dim - 1, m), and tangents (dim, dim - 1, m) there."""
         element = _SHAPES[self.kind][1][self.degree] if self.curved else FACES[self.kind][1]
         N, slope = evaluate(element, at)
-        nodes = self.points[:, self.faces[face, : len(N)]]
-        return np.einsum("dmj,jm->dm", nodes, N), np.einsum("dmj,jcm->dcm", nodes, slope)
+        place, tangents = np.zeros((self.dim, len(face))), np.zeros((self.dim, len(at), len(face)))
+        for node, value, rate in zip(self.faces[:, : len(N)].T, N, slope):
+            x = self.points[:, node[face]]
+            place += x * value
+            tangents += x[:, None] * rate
+        return place, tangents
 
     def true(self, x: np.ndarray) -> np.ndarray:
         """Points (dim, m) of the faces moved to the true surface."""
@@ -120,15 +124,26 @@ class Faces:
         Newton's iteration from `start`; a single step is exact on affine faces.
         """
         at = np.array(np.broadcast_to(start, (self.dim - 1, len(face))))
+        seen = axes.transpose(1, 0, 2)
         for _ in range(STEPS):
             here, tangents = self.locations(face, at)
-            step = np.linalg.solve(
-                np.einsum("mad,dcm->mac", axes, tangents), np.einsum("mad,dm->ma", axes, x - here)[..., None]
-            )[..., 0].T
+            apart = x - here
+            step = _solve(
+                [[sum(a * t for a, t in zip(axis.T, tangent)) for tangent in tangents.transpose(1, 0, 2)] for axis in seen],
+                [sum(a * d for a, d in zip(axis.T, apart)) for axis in seen],
+            )
             at = np.clip(at + step, -2.0, 3.0)
             if np.abs(step).max(initial=0.0) < NEWTON or not (self.distorted):
                 break
         return at
+
+
+def _solve(A: list[list[np.ndarray]], b: list[np.ndarray]) -> np.ndarray:
+    """Solutions (n, m) of m systems of one or two equations, with entries A[row][column] (m,)."""
+    if len(b) == 1:
+        return np.stack([b[0] / A[0][0]])
+    (a00, a01), (a10, a11) = A
+    return np.stack([a11 * b[0] - a01 * b[1], a00 * b[1] - a10 * b[0]]) / (a00 * a11 - a01 * a10)
 
 
 def evaluate(element: skfem.Element, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

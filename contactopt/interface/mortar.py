@@ -17,7 +17,8 @@ is the value at contact i of its best linear fit on the covered part. Hence:
 * The psi_i add up to one, so that a uniform pressure, r_i = p a_i, gives every node of both sides exactly the integral of
   its shape function: the patch test. It holds on partly covered faces too.
 * A contact outside the other surface, whose cell is partly covered, keeps its place: fields are continued linearly to it.
-  Contacts without any covered cell are left out.
+  Contacts without any covered cell are left out, and those that a covered part hardly reaches (WEAK) pass their share of
+  it on to the strongest contact of the same cell.
 
 **Moments.** Forces act at W x and W' x'. The vector e_i = W_ij x_j - W'_ij x'_j between these places is zero where the
 surfaces lie on each other, but not where both are polygons inscribed in one curve; the moment of interface forces is the
@@ -60,7 +61,8 @@ from contactopt.errors import InputError
 from contactopt.interface.segments import Overlap, overlap
 from contactopt.interface.faces import Faces, cross, evaluate
 
-SLIVER = 1e-8  # directions in which a covered part extends less than the square root of this: fields are constant there
+SLIVER = 1e-11  # directions in which a covered part extends less than the square root of this: fields are constant there
+WEAK = 1e-5  # contacts with less than this share of the covered part of their cells pass it on to a neighbour
 LEVER = 1 / 8  # of the size of a contact's cells: larger gaps are levers of the geometry, not of the faces
 ROUNDING = 1e-11  # shorter levers, over the size of faces, are rounding
 BLOCK = 200_000  # points of integration at a time
@@ -189,8 +191,10 @@ def _integrate(own: Faces, other: Faces, points: Overlap) -> tuple[np.ndarray, .
     used, cell = np.unique(points.cell, return_inverse=True)
     face, local = used // len(own.cells), used % len(own.cells)
 
+    first = np.searchsorted(cell, np.arange(len(used)))  # points come in the order of the cells
+
     def summed(values: np.ndarray) -> np.ndarray:
-        return np.stack([np.bincount(cell, v, len(used)) for v in values], axis=1)
+        return np.add.reduceat(values, first, axis=1).T
 
     phi = own.hats(points.cell % len(own.cells), points.at)
     area = summed(phi * points.measure)  # (cell, v)
@@ -201,13 +205,16 @@ def _integrate(own: Faces, other: Faces, points: Overlap) -> tuple[np.ndarray, .
     fit = _slopes(mass, area, whole)  # value at vertex v less the mean = fit (v, w) int centred_w f
 
     def functional(values: np.ndarray, block: slice) -> np.ndarray:
-        """(g, v, ...) what the points of a block contribute to int psi_v f."""
-        c, measure = cell[block], points.measure[block]
-        dual = area[c] * (1 / whole[c, None] + np.einsum("gvw,wg->gv", fit[c], centred[:, block]))
-        return np.einsum("gv,jg,g->gvj", dual, values, measure)
+        """(pair, v, j) int psi_v f_j over the points of a block, summed for every pair of a cell and a face."""
+        c = cell[block]
+        dual = area[c].T * (1 / whole[c] + np.einsum("gvw,wg->vg", fit[c], centred[:, block]))
+        weighted = dual * points.measure[block]
+        return np.stack([np.add.reduceat(w * values, pairs, axis=1).T for w in weighted], axis=1)
 
     nodes, rows = np.unique(own.faces[face[:, None], own.cells[local]], return_inverse=True)
-    rows = rows.reshape(area.shape)
+    rows = _pass_on(rows.reshape(area.shape), area, whole)
+    strong, rows = np.unique(rows, return_inverse=True)
+    nodes, rows = nodes[strong], rows.reshape(area.shape)
     areas = np.bincount(rows.ravel(), area.ravel(), len(nodes))
     W = sp.csr_matrix((len(nodes), own.points.shape[1]))
     W_other = sp.csr_matrix((len(nodes), other.points.shape[1]))
@@ -215,11 +222,13 @@ def _integrate(own: Faces, other: Faces, points: Overlap) -> tuple[np.ndarray, .
     least, deepest = np.inf, np.zeros(own.dim)
     for start in range(0, len(cell), BLOCK):
         block = slice(start, start + BLOCK)
-        row = rows[cell[block]]
+        pairs = np.flatnonzero(np.diff(points.cell[block], prepend=-1) | np.diff(points.face[block], prepend=-1))
+        row = rows[cell[block]][pairs]
         places = []
         for surface, faces, at in ((own, points.cell // len(own.cells), points.at), (other, points.face, points.there)):
             N = surface.shapes(at[:, block])
-            term = _collect(functional(N, block), row, surface.faces[faces[block]], (len(nodes), surface.points.shape[1]))
+            column = surface.faces[faces[block]][pairs]
+            term = _collect(functional(N, block), row, column, (len(nodes), surface.points.shape[1]))
             if surface is own:
                 W = W + term
             else:
@@ -233,6 +242,19 @@ def _integrate(own: Faces, other: Faces, points: Overlap) -> tuple[np.ndarray, .
             apart[d] += np.bincount(row.ravel(), vector[:, :, d].ravel(), len(nodes))
     scale = sp.diags(1 / areas)
     return nodes, areas, _clean(scale @ W), _clean(scale @ W_other), apart / areas, (least, deepest)
+
+
+def _pass_on(rows: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    """Contacts (cell, v) at the vertices of cells, where those that a cell hardly reaches give way to the strongest there.
+
+    Next to a sliver of a covered part, the contact beyond it would ask the same as the one before it.
+    """
+    count = rows.max(initial=-1) + 1
+    share = np.bincount(rows.ravel(), area.ravel(), count)
+    around = np.bincount(rows.ravel(), np.repeat(whole, rows.shape[1]), count)
+    weak = (share < WEAK * around)[rows]
+    best = np.argmax(np.where(weak, -1.0, area), axis=1)
+    return np.where(weak, rows[np.arange(len(rows)), best][:, None], rows)
 
 
 def _unit_normals(own: Faces, points: Overlap, block: slice) -> np.ndarray:
@@ -254,17 +276,17 @@ def _slopes(mass: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray
 
 
 def _collect(values: np.ndarray, row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> sp.csr_matrix:
-    """Sparse matrix of values (g, v, j) in rows (g, v) and columns (g, j)."""
+    """Sparse matrix of values (pair, v, j) in rows (pair, v) and columns (pair, j)."""
     rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
     return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape)
 
 
 def _clean(W: sp.csr_matrix) -> sp.csr_matrix:
-    """Rounding made zero."""
+    """Rounding made zero, and rows made to add up to one exactly, whatever the condition of a sliver."""
     W = sp.csr_matrix(W)
     W.data[np.abs(W.data) < 1e-14] = 0.0
     W.eliminate_zeros()
-    return W
+    return sp.csr_matrix(sp.diags(1 / np.asarray(W.sum(axis=1)).ravel()) @ W)
 
 
 def _alone(own: Faces, other: Faces, points: Overlap, nodes: np.ndarray) -> tuple[sp.csr_matrix, sp.csr_matrix]:

@@ -25,12 +25,14 @@ from skfem.refdom import RefLine, RefTri
 
 from contactopt.bodies.elements import weight_at
 from contactopt.errors import InputError
-from contactopt.interface.faces import Faces, cross, patches
+from contactopt.interface.faces import Faces, cross, face_normals, patches
 
 SMALLEST = 1e-8  # cells that are covered by less than this fraction count as uncovered: the noise of coordinates
 FACING = -0.1  # the cosine between normals of faces that face each other is below this
 FOLD = 1.05  # a cell that is covered by more than this faces two layers of the other surface
-ORDER = {False: 0, True: 8}  # degrees added to the quadrature where a face is distorted: integrands are not polynomials
+# degrees added to the quadrature where a face is distorted, so that integrands are no polynomials: on flat interfaces, where
+# uniform pressure is exact up to this error, and on curved ones, where it is not
+FLAT, CURVED = 12, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +136,7 @@ def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     covered = np.bincount(cell[first], length, len(own.faces) * len(own.cells))
     _check_fold(other, vertices, cell, covered)
     keep = np.flatnonzero((length > 0) & (covered[cell[first]] > SMALLEST))
-    points, share = get_quadrature(RefLine, 8 + ORDER[own.curved or other.curved])
+    points, share = get_quadrature(RefLine, 8 + CURVED * (own.curved or other.curved))
     local = s[0, keep, None] + length[keep, None] * points[0]
     m = len(share)
     pair = np.repeat(keep, m)
@@ -234,7 +236,12 @@ def _order(own: Faces, other: Faces) -> int:
         return surface.degree * (2 if surface.corners == 4 else 1)
 
     hats = 2 if own.corners == 4 else 1
-    return hats + max(hats, highest(own), highest(other)) + ORDER[own.distorted or other.distorted]
+    order = hats + max(hats, highest(own), highest(other))
+    if not (own.distorted or other.distorted):
+        return order
+    normals = face_normals(own)
+    flat = np.all(np.abs(normals - normals[:, :1]) < 1e-9) and not own.curved
+    return order + (FLAT if flat else CURVED)
 
 
 def _areas(polygons: np.ndarray) -> np.ndarray:
