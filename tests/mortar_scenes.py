@@ -58,7 +58,7 @@ def assemble(m: Mortar, frames: np.ndarray, bodies: list) -> list[sp.csr_matrix]
     maps = []
     for i, body in enumerate(bodies):
         T = sp.csr_matrix((k * dim, body.A.shape[0]))
-        for c, row in enumerate(m.components(i, body.locations, held)):
+        for c, row in enumerate(m.components(i, held)):
             turn = sp.csr_matrix(
                 (frames[:, :, c].ravel(), (np.arange(k * dim), np.repeat(np.arange(k), dim))), (k * dim, k)
             )
@@ -104,7 +104,9 @@ def resultants(forces: list[np.ndarray], points: list[np.ndarray]) -> tuple[np.n
     return sum(f.sum(axis=1) for f in forces), moment
 
 
-def slab(kind: str, low: float, high: float, cells: int, start: float = 0.0, end: float = 1.0, power: float = 1.3) -> Any:
+def slab(
+    kind: str, low: float, high: float, cells: int, start: float = 0.0, end: float = 1.0, power: float = 1.3
+) -> Any:
     """Two layers of elements between two heights and two places, `cells` of uneven width; boundaries as conftest.block."""
     grids = [start + (end - start) * np.linspace(0.0, 1.0, cells + 1) ** power] * (2 if kind == "solid" else 1)
     up = "z" if kind == "solid" else "y"
@@ -135,15 +137,17 @@ def ring(inner: float, outer: float, layers: int, sectors: int, angle: float, cu
     size = np.hypot(*closed.p)
     return closed.with_boundaries(
         {
-            name: lambda x, radius=radius: np.hypot(*x) < radius * 1.0001
-            if radius == inner
-            else np.hypot(*x) > (inner + 3 * outer) / 4
+            name: lambda x, radius=radius: (
+                np.hypot(*x) < radius * 1.0001 if radius == inner else np.hypot(*x) > (inner + 3 * outer) / 4
+            )
             for name, radius in (("inner", inner), ("outer", size.max()))
         }
     )
 
 
-def press_fit(sectors: tuple[int, int], degree: int, interference: float, kept: bool, curved: bool, kind: str = "", mu=0.0):
+def press_fit(
+    sectors: tuple[int, int], degree: int, interference: float, kept: bool, curved: bool, kind: str = "", mu=0.0
+):
     """A quarter of a ring 2 < r < 3 pressed on a ring 1 < r < 2; `kept`: the true circles are known."""
     material = Material(5.0, 0.3)
     sides = (Support("start", {"y": 0.0}), Support("end", {"x": 0.0}))

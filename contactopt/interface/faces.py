@@ -129,7 +129,10 @@ class Faces:
             here, tangents = self.locations(face, at)
             apart = x - here
             step = _solve(
-                [[sum(a * t for a, t in zip(axis.T, tangent)) for tangent in tangents.transpose(1, 0, 2)] for axis in seen],
+                [
+                    [sum(a * t for a, t in zip(axis.T, tangent)) for tangent in tangents.transpose(1, 0, 2)]
+                    for axis in seen
+                ],
                 [sum(a * d for a, d in zip(axis.T, apart)) for axis in seen],
             )
             at = np.clip(at + step, -2.0, 3.0)

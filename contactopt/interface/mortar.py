@@ -58,14 +58,11 @@ from skfem.quadrature import get_quadrature
 
 from contactopt.bodies.elements import FACES
 from contactopt.errors import InputError
-from contactopt.interface.segments import Overlap, overlap
+from contactopt.interface.dual import collect, integrate, tidy
 from contactopt.interface.faces import Faces, cross, evaluate
+from contactopt.interface.levers import levers, rotations_times
+from contactopt.interface.segments import Overlap, overlap
 
-SLIVER = 1e-11  # directions in which a covered part extends less than the square root of this: fields are constant there
-WEAK = 1e-5  # contacts with less than this share of the covered part of their cells pass it on to a neighbour
-LEVER = 1 / 8  # of the size of a contact's cells: larger gaps are levers of the geometry, not of the faces
-ROUNDING = 1e-11  # shorter levers, over the size of faces, are rounding
-BLOCK = 200_000  # points of integration at a time
 OVERLAP = 1e-9  # initial overlap, over the extent of the contact surface, that is reported
 
 _log = logging.getLogger(__name__)
@@ -84,7 +81,8 @@ class Mortar:
     weights  two (k, nodes of the body): what the displacement of the nodes contributes to that of the contacts
     alone    two (k, nodes of the body): the displacement at the contact's own node, and at the place facing it
     lever    (dim, k) l_i, from the other body to the own one [length]; zero where the surfaces lie on each other
-    around   (k, nodes of the own body) weights w of the rotations
+    carried  [c][d] (k, nodes of the own body): what displacements d contribute to component c of omega_i x l_i; empty
+             where all levers are zero
     """
 
     own: int
@@ -96,26 +94,26 @@ class Mortar:
     weights: tuple[sp.csr_matrix, sp.csr_matrix]
     alone: tuple[sp.csr_matrix, sp.csr_matrix]
     lever: np.ndarray
-    around: sp.csr_matrix
+    carried: list[list[sp.csr_matrix]]
 
-    def components(self, body: int, points: np.ndarray, held: np.ndarray) -> list[list[sp.csr_matrix]]:
-        """Matrices G[c][d] (k, nodes): how displacements d of the nodes of a body contribute to component c of the contacts.
+    def components(self, body: int, held: np.ndarray) -> list[list[sp.csr_matrix]]:
+        """Matrices [c][d] (k, nodes): what displacements d of the nodes of a body contribute to component c of the contacts.
 
-        points  (dim, nodes) coordinates of the body's nodes
-        held    (dim, k) components that supports hold at the contacts' nodes on the own body
-        The relative displacement is that of the upper body less that of the lower one.
+        The relative displacement is that of the upper body, 0, less that of the lower one, 1.
+
+        Parameters
+        ----------
+        held  (dim, k) the components that supports hold at the contacts' nodes on the own body
         """
-        dim, k = self.lever.shape
+        dim = len(self.lever)
         W, alone = self.weights[body], self.alone[body]
-        empty = sp.csr_matrix(W.shape)
-        G = [[empty] * dim for _ in range(dim)]
+        made = [[sp.csr_matrix(W.shape)] * dim for _ in range(dim)]
         for c in range(dim):
-            G[c][c] = W - sp.diags(held[c].astype(float)) @ (W - alone)
-        if body == self.own and np.any(self.lever):
-            for c, row in enumerate(rotations(self.around, points, self.lever)):
-                for d, part in enumerate(row):
-                    G[c][d] = G[c][d] - sp.diags((~held[c]).astype(float)) @ part
-        return G
+            made[c][c] = W - sp.diags(held[c].astype(float)) @ (W - alone)
+            if body == self.own and self.carried:
+                free = sp.diags((~held[c]).astype(float))
+                made[c] = [there - free @ part for there, part in zip(made[c], self.carried[c])]
+        return made
 
 
 def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
@@ -139,18 +137,24 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
             f"the contact boundaries of body '{upper.name}' and body '{lower.name}' face each other nowhere; "
             "check the boundaries' names, the bodies' positions, and which of them is the upper one."
         )
-    nodes, areas, W, W_other, apart, least = _integrate(mine, theirs, points)
-    n = sign * normals[:, nodes]
-    gap = -sign * np.sum(n * apart, axis=0)
-    alone, alone_other = _alone(mine, theirs, points, nodes)
-    e = W @ mine.points.T - W_other @ theirs.points.T
-    lever = np.zeros_like(n) if mine.weight[1] else _lever(e.T, -sign * n, gap, LEVER * sizes[nodes])
-    _report_overlap(least, np.ptp(mine.points[:, nodes], axis=1).max(), pair)
-    sides = [(W, alone), (W_other, alone_other)]
-    (W0, alone0), (W1, alone1) = sides if first == 0 else sides[::-1]
-    return Mortar(
-        first, nodes, areas, n, gap, mine.points[:, nodes], (W0, W1), (alone0, alone1), lever, _around(mine, nodes)
-    )
+    sums = integrate(mine, theirs, points)
+    n = sign * normals[:, sums.nodes]
+    gap = -sign * np.sum(n * sums.apart, axis=0)
+    lever = np.zeros_like(n)
+    if not mine.weight[1]:
+        e = sums.own @ mine.points.T - sums.other @ theirs.points.T
+        lever = levers(e.T, -sign * n, gap, sizes[sums.nodes])
+    carried = rotations_times(lever, mine, sums.nodes) if np.any(lever) else []
+    x = mine.points[:, sums.nodes]
+    if sums.least < -OVERLAP * np.ptp(x, axis=1).max():
+        where = ", ".join(f"{c:.4g}" for c in sums.nearest)
+        _log.warning(
+            "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)", upper.name, lower.name, -sums.least, where
+        )
+    weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, sums.nodes)
+    if first == 1:
+        weights, alone = weights[::-1], alone[::-1]
+    return Mortar(first, sums.nodes, sums.areas, n, gap, x, weights, alone, lever, carried)
 
 
 def _contacts(surface: Faces, faces: np.ndarray) -> int:
@@ -181,114 +185,6 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
     return normals, area ** (1 / (surface.dim - 1))
 
 
-def _integrate(own: Faces, other: Faces, points: Overlap) -> tuple[np.ndarray, ...]:
-    """Contacts and their integrals.
-
-    Returns nodes (k,), areas (k,), weights on both sides, the weighted vector (dim, k) from the other true surface to the
-    own one, and the least distance of the true surfaces at a point of integration with this point.
-    """
-    count = own.cells.shape[1]
-    used, cell = np.unique(points.cell, return_inverse=True)
-    face, local = used // len(own.cells), used % len(own.cells)
-
-    first = np.searchsorted(cell, np.arange(len(used)))  # points come in the order of the cells
-
-    def summed(values: np.ndarray) -> np.ndarray:
-        return np.add.reduceat(values, first, axis=1).T
-
-    phi = own.hats(points.cell % len(own.cells), points.at)
-    area = summed(phi * points.measure)  # (cell, v)
-    whole = area.sum(axis=1)
-    mean = area / whole[:, None]
-    centred = phi - mean[cell].T
-    mass = summed((centred[:, None] * centred * points.measure).reshape(count * count, -1)).reshape(-1, count, count)
-    fit = _slopes(mass, area, whole)  # value at vertex v less the mean = fit (v, w) int centred_w f
-
-    def functional(values: np.ndarray, block: slice) -> np.ndarray:
-        """(pair, v, j) int psi_v f_j over the points of a block, summed for every pair of a cell and a face."""
-        c = cell[block]
-        dual = area[c].T * (1 / whole[c] + np.einsum("gvw,wg->vg", fit[c], centred[:, block]))
-        weighted = dual * points.measure[block]
-        return np.stack([np.add.reduceat(w * values, pairs, axis=1).T for w in weighted], axis=1)
-
-    nodes, rows = np.unique(own.faces[face[:, None], own.cells[local]], return_inverse=True)
-    rows = _pass_on(rows.reshape(area.shape), area, whole)
-    strong, rows = np.unique(rows, return_inverse=True)
-    nodes, rows = nodes[strong], rows.reshape(area.shape)
-    areas = np.bincount(rows.ravel(), area.ravel(), len(nodes))
-    W = sp.csr_matrix((len(nodes), own.points.shape[1]))
-    W_other = sp.csr_matrix((len(nodes), other.points.shape[1]))
-    apart = np.zeros((own.dim, len(nodes)))
-    least, deepest = np.inf, np.zeros(own.dim)
-    for start in range(0, len(cell), BLOCK):
-        block = slice(start, start + BLOCK)
-        pairs = np.flatnonzero(np.diff(points.cell[block], prepend=-1) | np.diff(points.face[block], prepend=-1))
-        row = rows[cell[block]][pairs]
-        places = []
-        for surface, faces, at in ((own, points.cell // len(own.cells), points.at), (other, points.face, points.there)):
-            N = surface.shapes(at[:, block])
-            column = surface.faces[faces[block]][pairs]
-            term = _collect(functional(N, block), row, column, (len(nodes), surface.points.shape[1]))
-            if surface is own:
-                W = W + term
-            else:
-                W_other = W_other + term
-            places.append(surface.true(surface.locations(faces[block], at[:, block])[0]))
-        distance = -np.sum((places[0] - places[1]) * _unit_normals(own, points, block), axis=0)
-        if distance.min() < least:
-            least, deepest = float(distance.min()), places[0][:, np.argmin(distance)]
-        vector = functional(places[0] - places[1], block)
-        for d in range(own.dim):
-            apart[d] += np.bincount(row.ravel(), vector[:, :, d].ravel(), len(nodes))
-    scale = sp.diags(1 / areas)
-    return nodes, areas, _clean(scale @ W), _clean(scale @ W_other), apart / areas, (least, deepest)
-
-
-def _pass_on(rows: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """Contacts (cell, v) at the vertices of cells, where those that a cell hardly reaches give way to the strongest there.
-
-    Next to a sliver of a covered part, the contact beyond it would ask the same as the one before it.
-    """
-    count = rows.max(initial=-1) + 1
-    share = np.bincount(rows.ravel(), area.ravel(), count)
-    around = np.bincount(rows.ravel(), np.repeat(whole, rows.shape[1]), count)
-    weak = (share < WEAK * around)[rows]
-    best = np.argmax(np.where(weak, -1.0, area), axis=1)
-    return np.where(weak, rows[np.arange(len(rows)), best][:, None], rows)
-
-
-def _unit_normals(own: Faces, points: Overlap, block: slice) -> np.ndarray:
-    """(dim, g) outward unit normals of the own faces at points of integration."""
-    face = points.cell[block] // len(own.cells)
-    normal = cross(own.locations(face, points.at[:, block])[1]) * own.turn[face]
-    return np.asarray(normal / np.linalg.norm(normal, axis=0))
-
-
-def _slopes(mass: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """(cell, v, w) from the moments of a field with the centred hat functions to its fit at the vertices, less its mean."""
-    values, vectors = np.linalg.eigh(mass)
-    large = values > SLIVER * whole[:, None]
-    inverse = np.where(large, 1 / np.where(large, values, 1.0), 0.0)
-    plain = np.einsum("cvi,ci,cwi->cvw", vectors, inverse, vectors)
-    share = area / whole[:, None]
-    left = plain - np.einsum("cv,cvw->cw", share, plain)[:, None, :]
-    return np.asarray(left - np.einsum("cvw,cw->cv", left, share)[:, :, None])
-
-
-def _collect(values: np.ndarray, row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> sp.csr_matrix:
-    """Sparse matrix of values (pair, v, j) in rows (pair, v) and columns (pair, j)."""
-    rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
-    return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape)
-
-
-def _clean(W: sp.csr_matrix) -> sp.csr_matrix:
-    """Rounding made zero, and rows made to add up to one exactly, whatever the condition of a sliver."""
-    W = sp.csr_matrix(W)
-    W.data[np.abs(W.data) < 1e-14] = 0.0
-    W.eliminate_zeros()
-    return sp.csr_matrix(sp.diags(1 / np.asarray(W.sum(axis=1)).ravel()) @ W)
-
-
 def _alone(own: Faces, other: Faces, points: Overlap, nodes: np.ndarray) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """The own node of every contact, and the shape functions of the other side at the place that faces it."""
     k = len(nodes)
@@ -300,58 +196,5 @@ def _alone(own: Faces, other: Faces, points: Overlap, nodes: np.ndarray) -> tupl
     if other.corners == 3:
         there /= np.maximum(there.sum(axis=0), 1.0)
     N = other.shapes(there)
-    theirs = _collect(N.T[:, None, :], np.arange(k)[:, None], other.faces[points.face[near]], (k, other.points.shape[1]))
-    return mine, _clean(theirs)
-
-
-def _lever(e: np.ndarray, up: np.ndarray, gap: np.ndarray, limit: np.ndarray) -> np.ndarray:
-    """l (dim, k): the part of e that is no gap, and of the gap at most `limit`; `up` are normals along which it opens."""
-    lever = e - up * (gap - np.clip(gap, -limit, limit))
-    scale = ROUNDING * max(limit.max() / LEVER, np.abs(e).max())
-    return np.asarray(np.where(np.linalg.norm(lever, axis=0) > scale, lever, 0.0))
-
-
-def _around(own: Faces, nodes: np.ndarray) -> sp.csr_matrix:
-    """(k, n) areas of the faces that contact and node have in common."""
-    f, size = len(own.faces), own.points.shape[1]
-    corners = own.points[:, own.faces[:, : own.corners]]
-    extent = np.ptp(corners, axis=2).max(axis=0)
-    incident = sp.csr_matrix(
-        (np.ones(own.faces.size), (own.faces.ravel(), np.repeat(np.arange(f), own.faces.shape[1]))), (size, f)
-    )
-    return sp.csr_matrix(incident[nodes] @ sp.diags(extent ** (own.dim - 1)) @ incident.T)
-
-
-def rotations(around: sp.csr_matrix, points: np.ndarray, lever: np.ndarray) -> list[list[sp.csr_matrix]]:
-    """Matrices (k, n) from displacements d of the nodes to component c of omega_i x l_i."""
-    dim, k = lever.shape
-    w = sp.coo_matrix(around)
-    active = np.any(lever != 0, axis=0)[w.row]
-    i, j, weight = w.row[active], w.col[active], w.data[active]
-    total = np.bincount(i, weight, k)
-    centre = np.stack([np.bincount(i, weight * x[j], k) for x in points]) / np.where(total > 0, total, 1.0)
-    rho = points[:, j] - centre[:, i]
-    cross3 = np.zeros((len(i), 3, 3))  # rho x
-    full = np.zeros((3, len(i)))
-    full[:dim] = rho
-    cross3[:, 0, 1], cross3[:, 0, 2], cross3[:, 1, 2] = -full[2], full[1], -full[0]
-    cross3 -= cross3.transpose(0, 2, 1)
-    moments = -np.einsum("g,gab,gbc->gac", weight, cross3, cross3)
-    J = np.stack([np.bincount(i, m, k) for m in moments.reshape(len(i), 9).T], axis=1).reshape(k, 3, 3)
-    inverse = np.linalg.pinv(J, rcond=1e-10, hermitian=True)
-    arm = np.zeros((k, 3, 3))  # -(lever x) = x lever
-    tall = np.zeros((3, k))
-    tall[:dim] = lever
-    arm[:, 0, 1], arm[:, 0, 2], arm[:, 1, 2] = tall[2], -tall[1], tall[0]
-    arm -= arm.transpose(0, 2, 1)
-    values = np.einsum("gab,gbc,gcd,g->gad", arm[i], inverse[i], cross3, weight)
-    return [[sp.csr_matrix((values[:, c, d], (i, j)), around.shape) for d in range(dim)] for c in range(dim)]
-
-
-def _report_overlap(least: tuple[float, np.ndarray], extent: float, pair: tuple[Faces, Faces]) -> None:
-    distance, place = least
-    if distance < -OVERLAP * extent:
-        where = ", ".join(f"{c:.4g}" for c in place)
-        _log.warning(
-            "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)", *(s.name for s in pair), -distance, where
-        )
+    theirs = collect(N.T[:, None, :], np.arange(k)[:, None], other.faces[points.face[near]], (k, other.points.shape[1]))
+    return mine, tidy(theirs)

@@ -60,8 +60,7 @@ def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
 
     Raises InputError if the other surface is folded, so that some cell faces two of its layers.
     """
-    found = _lines(own, other, normals) if own.dim == 2 else _polygons(own, other)
-    return found
+    return _lines(own, other, normals) if own.dim == 2 else _polygons(own, other)
 
 
 def neighbours(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -76,7 +75,8 @@ def neighbours(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray
     for level in np.unique(octave):
         chosen = np.flatnonzero(octave == level)
         trees.append((chosen, KDTree(y[:, chosen].T), s[chosen].max()))
-    apart = np.min([tree.query(x.T)[0] - radius - r for _, tree, radius in trees], axis=0)
+    nearest = [(chosen, *tree.query(x.T)) for chosen, tree, _ in trees]
+    apart = np.min([distance - s[chosen[which]] - r for chosen, distance, which in nearest], axis=0)
     reach = r + 2 * np.maximum(apart, 0.0)
     pairs = []
     for chosen, tree, radius in trees:
@@ -146,9 +146,7 @@ def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     x, tangents = own.locations(face[first[pair]], here)
     there = other.locate(theirs[2][second[pair]], x, axes, np.array([[0.5]]))
     measure = (share * length[keep, None]).ravel() * np.abs(width[0, pair]) * np.linalg.norm(tangents[:, 0], axis=0)
-    return Overlap(
-        cell[first[pair]], here, theirs[2][second[pair]], there, axes, measure * weight_at(own.weight, x)
-    )
+    return Overlap(cell[first[pair]], here, theirs[2][second[pair]], there, axes, measure * weight_at(own.weight, x))
 
 
 def _project(
@@ -168,7 +166,9 @@ def _project(
         value = apart[0] * n[1] - apart[1] * n[0]
         rate = slope[0] * n[1] - slope[1] * n[0] + apart[0] * turn[1] - apart[1] * turn[0]
         flat = slope[0] * n[1] - slope[1] * n[0]
-        rate = np.where(rate * flat > 0.1 * flat**2, rate, flat)  # beyond the centre of curvature: the chord's direction
+        rate = np.where(
+            rate * flat > 0.1 * flat**2, rate, flat
+        )  # beyond the centre of curvature: the chord's direction
         new = np.clip(s - value / rate, -0.5, 1.5)
         done = np.abs(new - s).max(initial=0.0) < 1e-15
         s = new
@@ -202,7 +202,7 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     low, high = frame.min(axis=1)[first], frame.max(axis=1)[first]
     near = np.flatnonzero(np.all((subject.max(axis=1) > low) & (subject.min(axis=1) < high), axis=1))
     first, second = first[near], second[near]
-    polygon, count = _clip(subject[near], frame[first], size[first])
+    polygon = _clip(subject[near], frame[first], size[first])
     # a fan of triangles around the first vertex
     triangles = np.stack([np.repeat(polygon[:, :1], polygon.shape[1] - 2, axis=1), polygon[:, 1:-1], polygon[:, 2:]], 2)
     pair = np.repeat(np.arange(len(first)), triangles.shape[1])
@@ -250,8 +250,8 @@ def _areas(polygons: np.ndarray) -> np.ndarray:
     return np.asarray(np.sum(x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1), axis=1) / 2)
 
 
-def _clip(polygon: np.ndarray, window: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Parts (p, v', 2) of polygons (p, v, 2) inside convex counterclockwise windows (p, w, 2), and vertex counts (p,).
+def _clip(polygon: np.ndarray, window: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Parts (p, v', 2) of polygons (p, v, 2) inside convex counterclockwise windows (p, w, 2); `size` (p,) of the windows.
 
     Unused places at the end repeat the last vertex; a polygon without vertices is zero.
     """
@@ -278,4 +278,4 @@ def _clip(polygon: np.ndarray, window: np.ndarray, size: np.ndarray) -> tuple[np
         last = np.take_along_axis(polygon, np.maximum(count - 1, 0)[:, None, None], 1)
         polygon = np.where((np.arange(polygon.shape[1]) < count[:, None])[..., None], polygon, last)
         polygon[count == 0] = 0.0
-    return polygon, count
+    return polygon
