@@ -73,7 +73,11 @@ def couple(scene: Any, own: str | None = None, elements: int | None = None, zone
     elements, zone = elements or scene.elements, zone or scene.zone
     parts = (scene.upper, scene.lower)
     bodies = [build_body(scene, part, elements, zone) for part in parts]
-    m = mortar(*(faces_of(b, p) for b, p in zip(bodies, parts)), own)
+    sides = [
+        faces_of(b.name, b.basis, b.degree, b.basis.mesh.boundaries[p.contact], b.weight, b.locations, p.curve)
+        for b, p in zip(bodies, parts)
+    ]
+    m = mortar(*sides, own)
     frames = _frames(m.normals)
     maps = assemble(m, frames, bodies)
     reduced = [reduce_body(b, schur=False) for b in bodies]

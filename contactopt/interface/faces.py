@@ -14,9 +14,7 @@ from functools import cached_property
 import numpy as np
 import skfem
 
-from contactopt.bodies.body import Body
 from contactopt.bodies.elements import FACES, face_nodes
-from contactopt.scenes.scene import Part
 
 # kind of the elements -> corners of a face, shape functions of the displacement by degree
 _SHAPES = {
@@ -156,12 +154,28 @@ def evaluate(element: skfem.Element, at: np.ndarray) -> tuple[np.ndarray, np.nda
     return value, np.stack([np.broadcast_to(np.asarray(s).reshape(len(at), -1), at.shape) for _, s in values])
 
 
-def faces_of(body: Body, part: Part) -> Faces:
-    """The contact boundary of a discretised Part."""
-    faces, normals = face_nodes(body.basis, body.degree, np.asarray(body.basis.mesh.boundaries[part.contact]))
-    kind = body.basis.mesh.refdom.__name__
-    surface = Faces(body.name, kind, body.degree, body.locations, faces, np.ones(len(faces)), body.weight, part.curve)
-    return replace(surface, turn=np.sign(np.sum(face_normals(surface) * normals, axis=0)))
+def faces_of(
+    name: str,
+    basis: skfem.CellBasis,
+    degree: int,
+    facets: np.ndarray,
+    weight: tuple[float, bool],
+    points: np.ndarray,
+    curve: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> Faces:
+    """The faces of some facets of a body's mesh.
+
+    Parameters
+    ----------
+    basis   of the displacement of that degree
+    facets  (f,) numbers of the facets in the mesh of the basis
+    points  (dim, n) coordinates of all nodes of the body [length]
+    name, weight, curve  as in Faces
+    """
+    nodes, normals = face_nodes(basis, degree, facets)
+    kind = basis.mesh.refdom.__name__
+    made = Faces(name, kind, degree, points, nodes, np.ones(len(nodes)), weight, curve)
+    return replace(made, turn=np.sign(np.sum(face_normals(made) * normals, axis=0)))
 
 
 def face_normals(surface: Faces) -> np.ndarray:
