@@ -31,9 +31,9 @@ side at the other end of the lever, as a rotating surface carries it there:
 with omega_i the mean rotation of the nodes of the faces around contact i, rho_j their places from their centre, w_j the
 areas of the faces. It is exact for rigid motions, so that these give u = 0 at l_i = e_i, and by transposition forces on both bodies have
 no resultant moment. Since the lever is of second order in the size of the faces, so is what it changes. l_i also
-contains the gap itself, but at most an eighth of the size of a face (LEVER): the arc over a face of one radius deviates
-that much, so that polygons are in equilibrium whatever they are inscribed in, and the rest of a larger gap is left to the
-geometry. In an axisymmetric scene moments vanish by symmetry, and no lever is needed.
+contains the gap itself, but at most an eighth of the size of a face (levers.SHARE): an arc deviates from a chord as long as
+its radius by about that much, so that polygons are in equilibrium whether their curve is known or not, and the rest of a
+larger gap is left to the geometry. In an axisymmetric scene moments vanish by symmetry, and no lever is needed.
 
 **Contacts that are supported.** Where a support holds a component at a contact's node, that component of u_i is taken from
 this node alone, and from the other body at the place that faces it (`alone`); on a plane of symmetry both are at
