@@ -4,98 +4,63 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
-import scipy.sparse as sp
 import skfem
 
-from contactopt import InterfaceProblem, Material, Part, Scene, Support
-from contactopt.bodies.body import build_body
-from contactopt.interface.condensation import ReducedBody, reduce_body
+from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce_bodies
+from contactopt.interface.coupling import COUPLINGS, Coupling
 from contactopt.interface.faces import faces_of
-from contactopt.interface.matching import _frames
 from contactopt.interface.mortar import Mortar, mortar
+from contactopt.interface.reduction import Reduction
+from contactopt.interface.surfaces import couple_surfaces
 from contactopt.scenes.meshes import rename, tensor_mesh
 
 
 @dataclass
 class Coupled:
-    """A scene reduced with a mortar coupling: u = T0 U0 - T1 U1 + gap n."""
+    """A scene reduced with a mortar coupling, and the coupling's own contacts."""
 
-    problem: InterfaceProblem
-    bodies: list[ReducedBody]
-    maps: list[sp.csr_matrix]
+    reduction: Reduction
     mortar: Mortar
-    frames: np.ndarray
+
+    @property
+    def problem(self) -> InterfaceProblem:
+        return self.reduction.problem
+
+    @property
+    def bodies(self) -> Any:
+        return self.reduction.bodies
 
     @property
     def unknowns(self) -> int:
-        return sum(len(b.body.free) for b in self.bodies)
+        return sum(b.unknowns for b in self.bodies)
 
     def forces(self, reactions: np.ndarray) -> list[np.ndarray]:
         """Nodal forces (dim, nodes) on both bodies."""
-        signs = (1.0, -1.0)
-        return [s * (T.T @ reactions.ravel())[b.body.unknowns] for s, T, b in zip(signs, self.maps, self.bodies)]
-
-    def displacements(self, solution: Any) -> list[np.ndarray]:
-        out, start = [], 0
-        for sign, T, b in zip((1.0, -1.0), self.maps, self.bodies):
-            p = b.motions.shape[1]
-            force = sign * (T.T @ solution.reactions.ravel())
-            force[np.setdiff1d(np.arange(len(force)), b.body.free)] = 0
-            out.append(b.displacement(force, solution.multipliers[start : start + p])[b.body.unknowns])
-            start += p
-        return out
+        maps = self.reduction.coupling.upper, -self.reduction.coupling.lower
+        return [(T.T @ reactions.ravel())[b.body.unknowns] for T, b in zip(maps, self.bodies)]
 
 
-def assemble(m: Mortar, frames: np.ndarray, bodies: list) -> list[sp.csr_matrix]:
-    """T (k dim, n) of both bodies."""
-    dim, k = m.normals.shape
-    own = bodies[m.own]
-    fixed = np.ones(own.A.shape[0], dtype=bool)
-    fixed[own.free] = False
-    held = fixed[own.unknowns[:, m.nodes]]
-    maps = []
-    for i, body in enumerate(bodies):
-        T = sp.csr_matrix((k * dim, body.A.shape[0]))
-        for c, row in enumerate(m.components(i, held)):
-            turn = sp.csr_matrix(
-                (frames[:, :, c].ravel(), (np.arange(k * dim), np.repeat(np.arange(k), dim))), (k * dim, k)
-            )
-            for d, part in enumerate(row):
-                G = sp.coo_matrix(turn @ part)
-                T = T + sp.csr_matrix((G.data, (G.row, body.unknowns[d, G.col])), T.shape)
-        maps.append(sp.csr_matrix(T))
-    return maps
+def upper_carries(scene: Any, upper: Any, lower: Any) -> Coupling:
+    return couple_surfaces(scene, upper, lower, "upper")
+
+
+def lower_carries(scene: Any, upper: Any, lower: Any) -> Coupling:
+    return couple_surfaces(scene, upper, lower, "lower")
 
 
 def couple(scene: Any, own: str | None = None, elements: int | None = None, zone: float | None = None) -> Coupled:
-    elements, zone = elements or scene.elements, zone or scene.zone
-    parts = (scene.upper, scene.lower)
-    bodies = [build_body(scene, part, elements, zone) for part in parts]
-    sides = [
-        faces_of(b.name, b.basis, b.degree, b.basis.mesh.boundaries[p.contact], b.weight, b.locations, p.curve)
-        for b, p in zip(bodies, parts)
-    ]
-    m = mortar(*sides, own)
-    frames = _frames(m.normals)
-    maps = assemble(m, frames, bodies)
-    reduced = [reduce_body(b, schur=False) for b in bodies]
-    dim, k = m.normals.shape
-    Q, q = 0.0, np.zeros((k, dim))
-    q[:, 0] = m.gap
-    V, s = [], []
-    for sign, T, b in zip((1.0, -1.0), maps, reduced):
-        load = np.zeros((T.shape[1], T.shape[0]))
-        load[b.body.free] = T.T.toarray()[b.body.free]
-        Q = Q + T @ b.elastic(load)
-        q = q + sign * (T @ b.at_rest).reshape(q.shape)
-        V.append(sign * (T @ b.motions))
-        s.append(b.resultants)
-    problem = InterfaceProblem(
-        (Q + Q.T) / 2, q, np.full(k, scene.mu), np.concatenate(V, axis=1), np.concatenate(s), m.areas, m.points
-    )
-    return Coupled(problem, reduced, maps, m, frames)
+    name = "mortar" if own is None else f"{own}_carries"
+    kinds = {f"{side}_carries": ("mortar_scenes", f"{side}_carries", "") for side in ("upper", "lower")}
+    with patch.dict(COUPLINGS, kinds):
+        reduction = reduce_bodies(scene, elements, zone, coupling=name)
+    parts, sides = (scene.upper, scene.lower), []
+    for b, p in zip((r.body for r in reduction.bodies), parts):
+        facets = b.basis.mesh.boundaries[p.contact]
+        sides.append(faces_of(b.name, b.basis, b.degree, facets, b.weight, b.locations, p.curve))
+    return Coupled(reduction, mortar(*sides, own))
 
 
 def resultants(forces: list[np.ndarray], points: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
