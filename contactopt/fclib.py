@@ -6,8 +6,6 @@ Format: FCLib 1.x, https://frictionalcontactlibrary.github.io. Needs h5py (`pip 
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from contactopt.errors import InputError
+from contactopt.files import whole_file
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.coulomb import Coulomb
 
@@ -60,24 +59,16 @@ def write(problem: InterfaceProblem, path: str | Path, title: str = "", descript
             f"FCLib knows Coulomb's law only; this problem has {type(law).__name__} and cannot be written."
         )
     h5py = _h5py()
-    path = Path(path)
-    handle, name = tempfile.mkstemp(suffix=".hdf5", dir=path.parent)
-    os.close(handle)
-    try:
-        with h5py.File(name, "w") as file:
-            group = file.create_group("fclib_local")
-            group["spacedim"] = np.array([problem.dim], dtype=np.int32)
-            group["info/title"], group["info/description"] = title, description
-            _write_matrix(group.create_group("W"), sp.csc_matrix(problem.Q))
-            group["vectors/q"], group["vectors/mu"] = problem.q.ravel(), problem.mu
-            if len(problem.s):
-                _write_matrix(group.create_group("V"), sp.csc_matrix(problem.V))
-                _write_matrix(group.create_group("R"), sp.csc_matrix((len(problem.s), len(problem.s))))
-                group["vectors/s"] = problem.s
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+    with whole_file(path) as beside, h5py.File(beside, "w") as file:
+        group = file.create_group("fclib_local")
+        group["spacedim"] = np.array([problem.dim], dtype=np.int32)
+        group["info/title"], group["info/description"] = title, description
+        _write_matrix(group.create_group("W"), sp.csc_matrix(problem.Q))
+        group["vectors/q"], group["vectors/mu"] = problem.q.ravel(), problem.mu
+        if len(problem.s):
+            _write_matrix(group.create_group("V"), sp.csc_matrix(problem.V))
+            _write_matrix(group.create_group("R"), sp.csc_matrix((len(problem.s), len(problem.s))))
+            group["vectors/s"] = problem.s
 
 
 def _read_local(group: Any) -> InterfaceProblem:

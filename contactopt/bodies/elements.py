@@ -4,7 +4,7 @@ Quadratic shape functions N_j cannot weigh contact forces themselves: on the fac
 symmetry, their integrals vanish at the vertices. So the contact surface is covered by linear cells with hat functions
 phi_i and nodal areas A_i = int phi_i > 0, and their nodes are the contacts: the halves and quarters of the faces of
 quadrilaterals and hexahedra, the whole faces of triangles and tetrahedra, whose forces at vertices and edges would
-alternate (experiments.elements). A contact force r_i acts on the nodes j by r_i W_ij, the displacement at contact i is
+alternate (experiments.questions.elements). A contact force r_i acts on the nodes j by r_i W_ij, the displacement at contact i is
 W_ij u_j,
 
     W_ij = int psi_i N_j / A_i,    psi_i linear on each cell,  int psi_i phi_j = delta_ij A_i   (dual basis).

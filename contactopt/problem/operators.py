@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
 from contactopt.errors import InputError
+from contactopt.problem.chart import Chart
 
 log = logging.getLogger(__name__)
 
@@ -176,22 +177,25 @@ def loosened(Q: Interface, accuracy: float) -> Interface:
     return Q.loosened(accuracy) if isinstance(Q, InterfaceOperator) and Q.inexact else Q
 
 
-def nodal_weights(coordinates: np.ndarray, areas: np.ndarray, dim: int) -> np.ndarray:
-    """(k,) w with diag(Q) about proportional to 1 / w^2 at each contact, mean of w^2 one.
+def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
+    """Weights w (k,) of the contacts with diag(Q) about proportional to 1 / w^2; the mean of w^2 is one.
 
-    A force spread over a node's area makes a displacement that goes with 1 / length of the contact line there (2D) or with
-    1 / square root of the area (3D): w^2 = area / spacing along a line, sqrt(area) on a surface.
+    A force that is spread over the area of a node makes a displacement proportional to 1 / length of the contact line
+    there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area / spacing on a line, sqrt(area) on a surface.
+
+    Parameters
+    ----------
+    chart : the k contacts on their surface [length]
+    areas : (k,) nodal areas
     """
-    if dim == 3:
+    if len(chart.places) == 2:
         square = np.sqrt(areas)
     else:
-        order = np.argsort(coordinates[0])
-        steps = np.diff(coordinates[0, order])
-        spacing = np.empty(len(areas))
-        spacing[order] = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]]) if len(steps) else 1.0
+        spacing = chart.spacing()
         square = areas / np.where(spacing > 0, spacing, 1.0)
     positive = square[square > 0]
-    square = np.maximum(square, 1e-2 * np.mean(positive) if len(positive) else 1.0)  # the node on an axis has no area
+    # The node on an axis has no area; it gets a hundredth of the mean instead of an infinite diagonal.
+    square = np.maximum(square, 1e-2 * np.mean(positive) if len(positive) else 1.0)
     return np.sqrt(square / np.mean(square))
 
 

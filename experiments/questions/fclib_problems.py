@@ -1,4 +1,4 @@
-"""How do the methods do on problems of the FCLib collection? `python -m experiments.fclib_problems FOLDER`.
+"""How do the methods do on problems of the FCLib collection? `python -m experiments.questions.fclib_problems FOLDER`.
 
 The folder holds FCLib files (*.hdf5), which are not part of this project.
 """
@@ -75,6 +75,6 @@ if __name__ == "__main__":
     folder = Path(sys.argv[1]) if len(sys.argv) == 2 else None
     files = sorted(folder.glob("*.hdf5")) if folder else []
     if not files:
-        sys.exit("usage: python -m experiments.fclib_problems FOLDER, a folder with FCLib files (*.hdf5)")
+        sys.exit("usage: python -m experiments.questions.fclib_problems FOLDER, a folder with FCLib files (*.hdf5)")
     rows = [measure(path, method) for path in files for method in METHODS]
     write("fclib_problems", "Problems of the FCLib collection", TEXT, {"totals": totals(rows), "rows": rows}, {})
