@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
 from contactopt.errors import InputError
+
+RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
+LONGEST_NAME = 100  # characters
 
 
 def check_number(name: str, value: float, low: float = -np.inf, high: float = np.inf, closed: bool = False) -> None:
@@ -36,9 +40,20 @@ def check_count(name: str, value: int) -> None:
         raise InputError(f"{name} must be a whole number of at least 1; got {value!r}.")
 
 
-# Names that Windows keeps for devices, whatever the extension.
-RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
-LONGEST_NAME = 100  # characters
+def real_array(name: str, value: Any) -> np.ndarray:
+    """A copy of the value as an array of finite floats; InputError on text, ragged lists, complex or missing numbers."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise InputError(f"{name} must be an array of numbers; its rows have different lengths.") from error
+    if array.dtype.kind == "c":
+        raise InputError(f"{name} must be real; got complex numbers.")
+    if array.dtype.kind not in "biuf" and array.size:
+        raise InputError(f"{name} must be an array of numbers; got {type(value).__name__} of {array.dtype}.")
+    numbers = np.array(array, dtype=float)
+    if not np.all(np.isfinite(numbers)):
+        raise InputError(f"{name} holds a number that is not finite.")
+    return numbers
 
 
 def check_name(what: str, name: object) -> None:

@@ -1,6 +1,6 @@
 """How the contacts of an interface problem see the displacements of the bodies.
 
-A coupling is made once for a scene and kept with its reduction. It says where the contacts are, how their local frames
+A coupling is made once for each pair of surfaces of a scene and kept with its reduction. It says where the contacts are, how their local frames
 lie, how far apart the bodies are there, and how the displacements U of both bodies make the relative displacement
 
     u = T_upper U_upper - T_lower U_lower + gap n,
@@ -21,9 +21,10 @@ import scipy.sparse as sp
 from contactopt.bodies.protocol import AssembledBody, Surface
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
+from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
-# name -> (module, function (scene, upper, lower) -> Coupling, what it is)
+# name -> (module, function (scene, pair, upper, lower) -> Coupling, what it is)
 COUPLINGS = {
     "matching": (
         "contactopt.interface.matching",
@@ -35,7 +36,7 @@ COUPLINGS = {
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """The coupling of two bodies at k contacts.
+    """The coupling of two surfaces at k contacts.
 
     upper, lower  sparse maps T (k dim, n) from the displacement unknowns of each body to the components of its
                   displacement in the frames, contact by contact, normal component first
@@ -55,18 +56,30 @@ class Coupling:
     chart: Chart
 
 
-def couple(scene: Scene, upper: AssembledBody, lower: AssembledBody, kind: str = "matching") -> Coupling:
-    """The coupling of two assembled bodies by one of the kinds in COUPLINGS.
+def couple(scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody, kind: str | None = None) -> Coupling:
+    """The coupling of a pair of surfaces of two assembled bodies.
+
+    Parameters
+    ----------
+    scene, pair
+        The scene and one of its pairs.
+    upper, lower
+        Its bodies.
+    kind
+        A name in COUPLINGS, or 'auto'; by default that of the pair.
 
     Raises
     ------
     InputError
         For an unknown kind, and for surfaces that this kind cannot couple.
     """
+    kind = kind or pair.coupling
+    if kind == "auto":
+        kind = "matching"
     if kind not in COUPLINGS:
-        raise InputError(f"unknown coupling {kind!r}; choose from {', '.join(COUPLINGS)}.")
+        raise InputError(f"unknown coupling {kind!r}; choose from auto, {', '.join(COUPLINGS)}.")
     module, function, _ = COUPLINGS[kind]
-    made: Coupling = getattr(import_module(module), function)(scene, upper, lower)
+    made: Coupling = getattr(import_module(module), function)(scene, pair, upper, lower)
     return made
 
 

@@ -7,6 +7,7 @@ from contactopt.problem.certificate import balance_residual, fit_multipliers, na
 from contactopt.problem.chart import Chart
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.laws import LAWS, Law
+from contactopt.problem.pairs import Pair, alone
 from contactopt.problem.scaling import Scales, dimensionless
 from contactopt.problem.solution import Solution, Status
 
@@ -15,9 +16,11 @@ __all__ = [
     "Chart",
     "InterfaceProblem",
     "Law",
+    "Pair",
     "Scales",
     "Solution",
     "Status",
+    "alone",
     "balance_residual",
     "dimensionless",
     "fit_multipliers",
