@@ -24,7 +24,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
-from contactopt.bodies.protocol import AssembledBody, Body
+from contactopt.bodies.protocol import AssembledBody, Body, Product
 from contactopt.errors import InputError
 from contactopt.interface.costs import form_of
 from contactopt.interface.coupling import Coupling, couple
@@ -244,10 +244,16 @@ def _operator(
     parallel = [marked for *_, marked in terms]
 
     def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
+        def moves(term: tuple[Product, np.ndarray, bool]) -> tuple[np.ndarray, np.ndarray]:
+            """The columns that load a body at all, and what they make of it."""
+            act, rows, _ = term
+            load = X[rows]
+            columns = np.flatnonzero(load.any(axis=0)) if len(couplings) > 1 else np.arange(X.shape[1])
+            return columns, act(load[:, columns], accuracy) if len(columns) else load[:, columns]
+
         out = np.zeros(X.shape)
-        made = each(lambda term: term[0](X[term[1]], accuracy), terms, parallel)
-        for (_, rows, _), own in zip(terms, made):
-            out[rows] += own
+        for (_, rows, _), (columns, own) in zip(terms, each(moves, terms, parallel)):
+            out[np.ix_(rows, columns)] += own
         return out
 
     weights = [nodal_weights(made.chart, made.areas) for made in couplings]

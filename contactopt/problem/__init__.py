@@ -7,7 +7,7 @@ from contactopt.problem.certificate import balance_residual, fit_multipliers, na
 from contactopt.problem.chart import Chart
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.laws import LAWS, Law
-from contactopt.problem.pairs import Pair, alone
+from contactopt.problem.pairs import Pair, alone, part_of
 from contactopt.problem.scaling import Scales, dimensionless
 from contactopt.problem.solution import Solution, Status
 
@@ -25,4 +25,5 @@ __all__ = [
     "dimensionless",
     "fit_multipliers",
     "natural_map_residual",
+    "part_of",
 ]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contactopt.problem.chart import Chart
-from contactopt.problem.operators import InterfaceOperator, block
+from contactopt.problem.operators import block
 
 if TYPE_CHECKING:
     from contactopt.problem.interface_problem import InterfaceProblem
@@ -43,6 +43,24 @@ class Pair:
         return np.arange(self.first * dim, self.last * dim)
 
 
+def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
+    """The contacts of one pair as a problem, without forces at all others. Where there is one pair only, the problem itself."""
+    if len(problem.pairs) == 1:
+        return problem
+    rows, own = pair.unknowns(problem.dim), pair.contacts
+    return replace(
+        problem,
+        Q=block(problem.Q, rows),
+        q=problem.q[own],
+        law=problem.law.select(np.arange(pair.first, pair.last)),
+        V=problem.V[rows],
+        areas=problem.areas[own],
+        coordinates=problem.coordinates[:, own],
+        chart=pair.chart,
+        pairs=(Pair(pair.name, 0, pair.last - pair.first, pair.chart),),
+    )
+
+
 def alone(problem: InterfaceProblem, solution: Solution, pair: Pair) -> tuple[InterfaceProblem, Solution]:
     """The problem of one pair with the forces of all other pairs held at those of the solution, and its part of the solution.
 
@@ -52,21 +70,7 @@ def alone(problem: InterfaceProblem, solution: Solution, pair: Pair) -> tuple[In
     """
     if len(problem.pairs) == 1:
         return problem, solution
-    rows, own = pair.unknowns(problem.dim), pair.contacts
-    r, lam, V = solution.reactions[own], solution.multipliers, problem.V[rows]
-    u = problem.displacements(solution.reactions, lam)[own]
-    Q = block(problem.Q, rows)
-    q = u - (Q @ r.ravel() + V @ lam).reshape(r.shape)
-    whole = replace(
-        problem,
-        Q=Q,
-        q=q,
-        law=problem.law.select(np.arange(pair.first, pair.last)),
-        V=V,
-        s=-(V.T @ r.ravel()),
-        areas=problem.areas[own],
-        coordinates=problem.coordinates[:, own],
-        chart=pair.chart,
-        pairs=(Pair(pair.name, 0, pair.last - pair.first, pair.chart),),
-    )
-    return whole, replace(solution, reactions=r)
+    part, r, lam = part_of(problem, pair), solution.reactions[pair.contacts], solution.multipliers
+    apart = problem.displacements(solution.reactions, lam)[pair.contacts] - part.displacements(r, lam)
+    held = replace(part, q=part.q + apart, s=-(part.V.T @ r.ravel()))
+    return held, replace(solution, reactions=r)
