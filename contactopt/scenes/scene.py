@@ -17,6 +17,9 @@ from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.scenes.contact import Contact
 
+MOST_ELEMENTS = 100_000  # across the contact half-width
+LARGEST = 1e100  # of forces, stresses and lengths: the squares of larger ones are no numbers
+
 # The components of a displacement, in the order of the mesh coordinates.
 COMPONENTS = {"plane-strain": ("x", "y"), "axisymmetric": ("r", "z"), "solid": ("x", "y", "z")}
 
@@ -165,6 +168,8 @@ class Scene:
         for name, count in (("elements", self.elements), ("copies", self.copies)):
             if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
                 raise InputError(f"scene '{self.name}': {name} must be a whole number of at least 1; got {count!r}.")
+        if self.elements > MOST_ELEMENTS:
+            raise InputError(f"scene '{self.name}': elements must be at most {MOST_ELEMENTS}; got {self.elements}.")
         if self.degree not in (1, 2):
             raise InputError(
                 f"scene '{self.name}': the degree of the displacement must be 1 or 2; got {self.degree!r}."
@@ -282,7 +287,7 @@ class Scene:
                 )
             else:
                 for value in load.value:
-                    check_number(f"every {type(load).__name__} value of body '{part.name}'", value)
+                    check_number(f"every {type(load).__name__} value of body '{part.name}'", value, -LARGEST, LARGEST)
 
     def _check_components(self, body: str, values: Mapping[str, float]) -> None:
         for component, value in values.items():
@@ -290,4 +295,4 @@ class Scene:
                 raise InputError(
                     f"body '{body}': there is no component {component!r}; use {', '.join(self.components)}."
                 )
-            check_number(f"the {component} value of body '{body}'", value)
+            check_number(f"the {component} value of body '{body}'", value, -LARGEST, LARGEST)
