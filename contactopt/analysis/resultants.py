@@ -39,8 +39,9 @@ def resultant(points: np.ndarray, forces: np.ndarray, axisymmetric: bool, planes
         n, apart = plane.inward[:, None], plane.inward @ points - plane.offset
         points = np.hstack([points, points - 2 * n * apart])
         forces = np.hstack([forces, forces - 2 * n * (plane.inward @ forces)]) / 2
-    turned = np.cross(points.T, forces.T).reshape(points.shape[1], -1)
-    return Resultant(forces.sum(axis=1), turned.sum(axis=0))
+    tall = [np.pad(x, ((0, 3 - len(x)), (0, 0))) for x in (points, forces)]
+    moment = np.cross(*tall, axis=0).sum(axis=1)
+    return Resultant(forces.sum(axis=1), moment if len(points) == 3 else moment[2:])
 
 
 def planes_of(reduction: Reduction) -> tuple[SymmetryPlane, ...]:

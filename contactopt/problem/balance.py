@@ -22,6 +22,7 @@ DIRECTIONS = 16  # of the polygon inside each cone, in 3D
 SURE = 1e-6  # work of the largest load over a motion's displacements from which on the motion counts
 SLACK = 1e-9  # by how much rounding may violate the cones, over the size of the motion at a contact
 FLAT = 1e-6  # share of the motion of the contacts below which they do not slide
+TURNING = 1e-3  # least displacement by a rotation, over the largest, of a body that tips over
 SECONDS = 5.0  # for the linear program
 
 
@@ -29,7 +30,8 @@ SECONDS = 5.0  # for the linear program
 class Escape:
     """A motion z (p,) that moves the loads forward and that no contact resists: the least one, of few bodies.
 
-    strongest  number of the multiplier that moves furthest, of the body on which the loads do most work
+    strongest  number of the multiplier that moves furthest, of the body on which the loads do most work; where it turns
+               without sliding, that of the rotation
     opens      whether no contact slides in it
     """
 
@@ -55,8 +57,11 @@ def escape(problem: InterfaceProblem) -> Escape | None:
     owners = [name.partition(":")[0] for name in problem.motions] or ["" for _ in s]
     work = {owner: sum(s[i] * motion[i] for i, own in enumerate(owners) if own == owner) for owner in owners}
     body = max(work, key=lambda owner: work[owner])
-    own = np.array([owner == body for owner in owners])
-    return Escape(motion, int(np.argmax(np.abs(motion) * own)), opens)
+    size = np.abs(motion) * np.array([owner == body for owner in owners])
+    turns = size * np.array(["rotation" in name for name in problem.motions] or np.zeros(len(s)))
+    if opens and turns.max() > TURNING * size.max():
+        size = turns
+    return Escape(motion, int(np.argmax(size)), opens)
 
 
 def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.ndarray | None:
