@@ -16,7 +16,17 @@ def block(low, high, cells):
 
 
 def stack(
-    count=2, dim=2, side=0.0, weight=1.0, width=1.0, cells=(4, 4, 4), mu=0.5, kind=None, order=None, material=None, **more
+    count=2,
+    dim=2,
+    side=0.0,
+    weight=1.0,
+    width=1.0,
+    cells=(4, 4, 4),
+    mu=0.5,
+    kind=None,
+    order=None,
+    material=None,
+    **more,
 ):
     """`count` blocks of height one on a rigid floor. `side` and `weight` are forces per volume, along x and downwards.
 

@@ -65,7 +65,9 @@ def test_the_order_of_the_bodies_does_not_matter():
 def test_pairs_that_share_no_elastic_body_do_not_know_of_each_other():
     """Two blocks side by side on one rigid floor: both as if alone, each with its own friction and law."""
     loads = (Traction("top", (0.3, -1.0)),)
-    parts = [Part(n, block([x, 0], [x + 1, 1], [4, 4]), SOFT, loads=loads, contact="bottom") for n, x in (("a", 0), ("b", 3))]
+    parts = [
+        Part(n, block([x, 0], [x + 1, 1], [4, 4]), SOFT, loads=loads, contact="bottom") for n, x in (("a", 0), ("b", 3))
+    ]
     floor = Rigid("floor", normal=(0, 1))
     contacts = (Contact("a", "floor", 0.7), Contact("b", "floor", 0.6, law="associated"))
     both = reduce_bodies(Scene("two", bodies=(*parts, floor), contacts=contacts))
@@ -138,7 +140,9 @@ def test_a_wall_is_a_network():
 def test_forces_on_every_body_are_in_balance():
     """Loads, pairs, supports and plates: force and moment, with a plate, a support, a traction and friction."""
     lower = Part("lower", block([0, -2], [3, 0], [6, 4]), SOFT, (Support("bottom"),), contact="top")
-    middle = Part("middle", block([1, 0], [2, 1], [3, 3]), SOFT, contact="bottom", loads=(Traction("right", (-0.1, 0.0)),))
+    middle = Part(
+        "middle", block([1, 0], [2, 1], [3, 3]), SOFT, contact="bottom", loads=(Traction("right", (-0.1, 0.0)),)
+    )
     upper = Part("upper", block([1, 1], [2, 2], [3, 3]), SOFT, loads=(Plate("top", {"y": -2.0}),), contact="bottom")
     contacts = (Contact("middle", "lower", 0.4), Contact("upper", "middle:top", 0.4))
     reduction = reduce_bodies(Scene("three", bodies=(lower, middle, upper), contacts=contacts))
@@ -213,7 +217,10 @@ def test_tables_of_one_pair_are_those_of_the_whole():
 @pytest.mark.parametrize(
     "change,message",
     [
-        (lambda s: replace(s, contacts=(Contact("block0", "block7", 0.1),)), "'block7' that is not there.*floor, block0"),
+        (
+            lambda s: replace(s, contacts=(Contact("block0", "block7", 0.1),)),
+            "'block7' that is not there.*floor, block0",
+        ),
         (lambda s: replace(s, bodies=(*s.bodies, s.bodies[1])), "two bodies are named 'block0'"),
         (lambda s: replace(s, contacts=s.contacts[:1]), "body 'block1' belongs to no contact"),
         (lambda s: replace(s, contacts=(*s.contacts, s.contacts[0])), "given twice"),
@@ -236,7 +243,7 @@ def test_wrong_input_is_refused(change, message):
 
 def test_surfaces_that_are_not_there_are_refused():
     scene = stack(2)
-    with pytest.raises(InputError, match="'block0'.*no boundary named 'lid'.*bottom, left, right, top"):
+    with pytest.raises(InputError, match=r"'block0'.*no boundary named 'lid'.*bottom, left, right, top"):
         reduce_bodies(replace(scene, contacts=(scene.contacts[0], Contact("block1", "block0:lid", 0.1))))
     with pytest.raises(InputError, match="rigid body 'floor' has no surface"):
         reduce_bodies(replace(scene, contacts=(Contact("block0", "floor:top", 0.1), scene.contacts[1])))

@@ -189,7 +189,7 @@ def reduce_bodies(
     pairs = _pairs(scene, coupled)
     chart = pairs[0].chart if len(pairs) == 1 else None
     law, names = _law(scene.pairs, coupled), _names(bodies)
-    problem = InterfaceProblem(made, q, law, V, s, areas, points, chart, pairs, names)  # type: ignore[arg-type]
+    problem = InterfaceProblem(made, q, law, V, s, areas, points, chart, pairs, names)
     seconds["compliance"] = time.perf_counter() - start
     return Reduction(scene, problem, bodies, maps, coupled, seconds)
 

@@ -23,7 +23,15 @@ import scipy.sparse as sp
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import InterfaceOperator, loosened
-from contactopt.solving.kernels.alart_curnier import FIRST, cold_start, coulomb_equations, dense, forcing, krylov, sparse
+from contactopt.solving.kernels.alart_curnier import (
+    FIRST,
+    cold_start,
+    coulomb_equations,
+    dense,
+    forcing,
+    krylov,
+    sparse,
+)
 from contactopt.solving.methods import NATIVE, Iterate
 from contactopt.solving.notes import note
 from contactopt.solving.preconditioners import find_preconditioner
