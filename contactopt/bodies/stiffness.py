@@ -63,7 +63,7 @@ def _element_matrices(
     g = np.ascontiguousarray(np.moveaxis(g, (2, 0, 1, 3), (0, 1, 2, 3)))  # (element, i, a, point)
     divergence = g
     if weight[1]:
-        hoop = np.stack([np.asarray(f.value) for f in fields], axis=1) / x[0][:, None]
+        hoop = np.stack([np.asarray(f) for f in fields], axis=1) / x[0][:, None]
         divergence = g.copy()
         divergence[:, :, 0] += hoop
     K = lam * _pairs(divergence, measure)
