@@ -62,8 +62,8 @@ def test_exponents_of_growth():
 
 
 def test_the_pareto_front_is_drawn_through_what_nothing_beats():
-    points = np.array([[1, 5], [2, 3], [3, 4], [4, 1], [1, 6]])
-    rows = table(method=list("abcde"), solve_seconds=points[:, 0], residual=1e-8 * points[:, 1])
+    points = np.array([[1, 5], [2, 3], [3, 4], [3.5, 3.5], [4, 1], [1, 6]])
+    rows = table(method=list("abcdef"), solve_seconds=points[:, 0], residual=1e-8 * points[:, 1])
     front = lines(figures.speed_accuracy(rows))["Pareto front"]
     np.testing.assert_allclose(front * [1, 1e8], [[1, 5], [2, 3], [4, 1]])
 
