@@ -175,7 +175,8 @@ class _Search:
     """The nested solves and what they say. The last of `meshes`, with `splits`, is the mesh in question.
 
     meshes   levels of the main sequence: doubled elements without splits, or, where the meshes are given, splits alone
-    changes  of the value by the first split, the second, ...: those of the present splits, and at least one
+    changes  changes[i] is the change of the value by split i + 1. There is one entry for every split of the present mesh;
+             without a split there is still the first one, which was measured to learn what splits would do
     share    by which the first split multiplies the unknowns
     """
 
