@@ -1,7 +1,7 @@
 """The chosen numbers of this room, all of them, and the commands that show what they are worth.
 
-`python -m experiments.accuracy` measures readings and error estimates against exact solutions, `python -m
-experiments.cost_ratio` what the start from a coarse mesh saves.
+`python -m experiments.questions.accuracy` measures readings and error estimates against exact solutions.
+`python -m experiments.questions.cost_ratio` measures what the start from a coarse mesh saves.
 """
 
 # Reading edges and peaks (contactopt.analysis.edges, contactopt.analysis.quantities).
