@@ -32,10 +32,22 @@ OPEN, STICK, FORWARD, BACKWARD = range(4)
 
 
 def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]:
-    """Every solution of a 2D Coulomb problem, at most `limit` of them, each certified; [] if there is none.
+    """Find every solution of a small 2D problem with Coulomb's law.
 
-    Raises InputError in 3D, for other laws, for more than 24 contacts, for Q that is not positive definite on the
-    balanced forces and for plates that do not press; BackendError if HiGHS fails.
+    Parameters
+    ----------
+    problem : with at most 24 contacts
+    limit : number of solutions after which the search ends
+
+    Returns
+    -------
+    The solutions, each certified; an empty list if there is none.
+
+    Raises
+    ------
+    InputError : in 3D, for other laws, for more than 24 contacts, for a Q that is not positive definite on the forces that
+        keep the balance, and for plates that do not press
+    BackendError : if the solver HiGHS fails
     """
     check_number("limit", limit, low=0.0)
     if problem.dim != 2 or not _coulomb(problem) or problem.contacts > LARGEST:

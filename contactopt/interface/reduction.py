@@ -112,6 +112,11 @@ def reduce(
     solver
         Of the bodies' linear systems: 'auto' or a name in contactopt.bodies.solvers.SOLVERS.
 
+    Returns
+    -------
+    InterfaceProblem
+        Its compliance, gaps, motions and resultants, with the law of the scene.
+
     Raises
     ------
     InputError
@@ -128,9 +133,26 @@ def reduce_bodies(
     solver: str = "auto",
     coupling: str = "matching",
 ) -> Reduction:
-    """As reduce(), keeping the bodies for recovery.
+    """Reduce a scene to its interface problem and keep the bodies, from which fields are recovered.
 
-    The bodies are made solvable at the same time. `coupling` is a name in contactopt.interface.coupling.COUPLINGS.
+    Where the solvers of the bodies allow it, the bodies are factorised at the same time.
+
+    Parameters
+    ----------
+    scene, elements, zone, Q, solver
+        As for reduce().
+    coupling
+        A name in contactopt.interface.coupling.COUPLINGS.
+
+    Returns
+    -------
+    Reduction
+        The interface problem with the bodies, the coupling and the seconds that each phase took.
+
+    Raises
+    ------
+    InputError
+        As reduce().
     """
     if Q not in FORMS:
         raise InputError(f"unknown form of Q {Q!r}; choose from {', '.join(FORMS)}.")

@@ -17,7 +17,19 @@ from contactopt.scenes.scene import Scene
 def couple_surfaces(scene: Scene, upper: AssembledBody, lower: AssembledBody, own: str | None = None) -> Coupling:
     """The mortar coupling of two bodies with meshes (contactopt.interface.mortar), numbered along the chart.
 
-    own  'upper' or 'lower': the body that carries the contacts; None: the one with more contacts where they face each other
+    Parameters
+    ----------
+    scene
+        The kind of the scene and its law.
+    upper, lower
+        The two bodies, both with a mesh.
+    own
+        'upper' or 'lower', the body that carries the contacts; None: the one with more contacts where they face each other.
+
+    Returns
+    -------
+    Coupling
+        One contact for each node of that body that faces the other one.
 
     Raises
     ------

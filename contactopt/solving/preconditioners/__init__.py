@@ -81,9 +81,21 @@ def find_preconditioner(name: str | None) -> None:
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
     """The named approximate inverse of problem.Q, (k dim, k dim).
 
-    Uses of Q only its mean diagonal and which components cannot move.
-    Raises InputError for an unknown name, fewer than 3 contacts a side, or contacts not on a line or rectangular grid: the
-    caller says what it does instead.
+    Of Q it uses the mean of the diagonal, and which components cannot move.
+
+    Parameters
+    ----------
+    problem : of k contacts on a line, a closed curve or a rectangular grid
+    name : a key of PRECONDITIONERS
+
+    Returns
+    -------
+    Preconditioner, whose `model` is None where its inverse is not cheap.
+
+    Raises
+    ------
+    InputError : for an unknown name, for fewer than 3 contacts a side, and for contacts on no line and no rectangular grid.
+        The caller says what it does instead.
     """
     find_preconditioner(name)
     still = held(problem.Q)

@@ -36,7 +36,13 @@ def norm(m: float, h: float) -> np.ndarray:
 def p21(grid: Grid) -> tuple[GridMap, None]:
     """P21 = E' Q_c E of eq (25) on a line; on a rectangle its sum along both directions, P31 of eq (29).
 
-    Returns the product with P, and None because its inverse is not cheap.
+    Parameters
+    ----------
+    grid : of the contacts
+
+    Returns
+    -------
+    The product of P with arrays (*shape, dim), and None because its inverse is not cheap.
     """
     if grid.closed:
         symbol, smallest = closed_symbol(*grid.shape)
@@ -48,8 +54,19 @@ def p21(grid: Grid) -> tuple[GridMap, None]:
 def p22(grid: Grid) -> tuple[GridMap, GridMap]:
     """P22 = (E' L_c^-1 Q_c E)^-1 of eq (26), a Toeplitz system solved by conjugate gradients.
 
-    The spacing h of eq (28) is measured in quarters of the contact line's length, so that units do not matter. Returns the
-    products with P and with its inverse. Raises InputError on a surface, where the paper defines no P22.
+    The spacing h of eq (28) is measured in quarters of the contact line's length, so that units do not matter.
+
+    Parameters
+    ----------
+    grid : of the contacts, a line
+
+    Returns
+    -------
+    The products of P and of its inverse with arrays (k, dim).
+
+    Raises
+    ------
+    InputError : on a surface, where the paper defines no P22
     """
     if len(grid.shape) > 1:
         raise InputError("preconditioner 'p22' is for contact lines (2D); in 3D choose p21 or neumann.")

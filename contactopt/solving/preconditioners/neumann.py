@@ -83,6 +83,14 @@ def neumann(grid: Grid) -> tuple[GridMap, GridMap]:
 
     The Laplacian maps constants to zero, which has no inverse. Half the smallest other eigenvalue of the root stands in
     its place.
+
+    Parameters
+    ----------
+    grid : of the contacts
+
+    Returns
+    -------
+    The products of the root and of its inverse with arrays (*shape, dim).
     """
     parts = [_root(grid, component) for component in range(len(grid.held))]
     weight = grid.weights.reshape(grid.shape)
