@@ -37,6 +37,7 @@ def stiffness(basis: skfem.CellBasis, material: Material, weight: tuple[float, b
     owner = np.repeat(np.arange(graph.shape[0]), np.diff(graph.indptr))
     known = owner * graph.shape[0] + graph.indices  # ascending
     data = np.zeros(len(indices))
+    # Entry (a, b) of the block of two nodes stands at first + a step + b, and pairs of nodes are found by bisection.
     a, b = np.arange(dim)[:, None, None], np.arange(dim)
     for piece in _pieces(len(nodes), dim * nodes.shape[1]):
         own = nodes[piece].astype(np.int64)
