@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.constants import BELOW, FIRST, LARGEST, SLOWEST, STUCK
+from contactopt.analysis.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
 from contactopt.analysis.paths import PathResult, follow
 from contactopt.analysis.quantities import QUANTITIES, at_rim, uncertainty
 from contactopt.analysis.solve_scene import Options, Solved
@@ -111,7 +111,7 @@ def refine(
     """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
 
     It ends short of the target, with a sentence in the estimate, where the quantity does not converge, where the next mesh
-    would have more than LARGEST unknowns, or where a solve fails.
+    would have more than MOST_UNKNOWNS unknowns, or where a solve fails.
 
     Parameters
     ----------
@@ -259,9 +259,9 @@ class _Search:
         """A sentence if the next mesh passes the limit."""
         dim = self.states[-1].dim
         unknowns = growth * self.meshes[-1].unknowns * self.share**splits
-        if unknowns <= LARGEST[dim]:
+        if unknowns <= MOST_UNKNOWNS[dim]:
             return ""
-        return f"to go on would take up to {unknowns:.2g} unknowns, more than {LARGEST[dim]:,}"
+        return f"to go on would take up to {unknowns:.2g} unknowns, more than {MOST_UNKNOWNS[dim]:,}"
 
     def _refine_mesh(self) -> None:
         i = len(self.meshes)
