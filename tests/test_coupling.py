@@ -187,8 +187,8 @@ def test_a_coupling_is_added_by_one_line(monkeypatch):
     scene = two_blocks("plane-strain")
     plain, raised = reduce_bodies(scene), reduce_bodies(scene, coupling="lifted")
     assert np.allclose(raised.problem.q[:, 0], plain.problem.q[:, 0] + 1.0)
-    with pytest.raises(InputError, match="unknown coupling 'mortar'; choose from matching"):
-        reduce_bodies(scene, coupling="mortar")
+    with pytest.raises(InputError, match="unknown coupling 'glue'; choose from matching, mortar"):
+        reduce_bodies(scene, coupling="glue")
 
 
 @dataclass(frozen=True)
