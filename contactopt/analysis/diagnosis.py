@@ -60,7 +60,11 @@ REAL, ZERO = 1e-7, 1e-10  # an eigenvalue with relatively less imaginary part is
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Values of the largest mu (all scaled together) below which there is one solution, or an iteration contracts."""
+    """Bounds of the largest friction coefficient, all coefficients scaled together [-].
+
+    unique       below it there is one solution
+    tresca       below it the Tresca iteration contracts;   alternating  below it the alternating iteration contracts
+    """
 
     unique: float
     tresca: float
