@@ -77,7 +77,7 @@ def mprgp(
     low : (n,) bounds, finite or -inf
     start : (n,); None: zero
     tol : bound of the projected gradient over |c|
-    max_iterations : products with P, or twice as many
+    max_iterations : steps, each with one or two products with P
     largest : an upper bound of P's largest eigenvalue; estimated if None
 
     Returns
