@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual, siconos_residual
     from contactopt.problem.transfer import transfer
     from contactopt.runner import Result, run
+    from contactopt.scenes.contact import Contact
     from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
     from contactopt.solving.driver import solve
 
@@ -42,6 +43,7 @@ _HOMES = {
     "problem.transfer": ("transfer",),
     "runner": ("Result", "run"),
     "material": ("Material",),
+    "scenes.contact": ("Contact",),
     "scenes.scene": ("BodyForce", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
     "solving.driver": ("solve",),
 }

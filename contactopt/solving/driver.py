@@ -21,6 +21,7 @@ from contactopt.problem import (
     infeasibility,
     natural_map_residual,
 )
+from contactopt.problem.balance import escape, sentence
 from contactopt.problem.operators import InterfaceOperator, loosened
 from contactopt.solving.deadline import TimeUp, until
 from contactopt.solving.methods import Iterate, Method, default_method, find_method, solvers_of, solves
@@ -254,7 +255,16 @@ def _relative(new: np.ndarray, old: np.ndarray) -> float:
 
 
 def _check_equilibrium(problem: InterfaceProblem) -> None:
-    """Contact only pushes: a plate that moves along the normals must be pressed on, not pulled off."""
+    """Contact only pushes: InputError for a load that it cannot balance.
+
+    Where the multipliers are known by name, the motion along which the bodies escape is looked for. Otherwise only a plate
+    that moves along the normals and is pulled off is refused.
+    """
+    if problem.motions:
+        found = escape(problem)
+        if found is not None:
+            raise InputError(sentence(problem, found))
+        return
     if not problem.law.unilateral:
         return
     V = problem.V.reshape(problem.contacts, problem.dim, -1)
