@@ -105,6 +105,10 @@ def run(
     note : receives progress messages
     changes : to the arguments of a named scene, or to the fields of a Scene
 
+    Returns
+    -------
+    Result : the solution with its interface problem, the fields of the bodies, and a summary
+
     Raises
     ------
     InputError : on input that cannot be used, with a sentence that says what to do; nothing is left half-written
