@@ -31,6 +31,7 @@ from contactopt.scenes.mesh_repair import (
 )
 
 PLANE = 1e-9  # a mesh is plane if it is thinner than this fraction of its size
+FAR = 1e100  # larger coordinates have no volume in floating-point numbers
 FACET_CORNERS = {"line": 2, "line3": 2, "triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
 
 log = logging.getLogger(__name__)
@@ -125,14 +126,14 @@ def name_boundaries(mesh: skfem.Mesh, places: Mapping[str, Mapping[int, tuple[fl
 
 def _place(path: Path, groups: FileGroups) -> tuple[int, np.ndarray]:
     """Dimension of the bodies, 2 or 3, and the nodes (dim, n) in as many coordinates."""
-    dim = max(dims for _, _, dims in groups.blocks)
+    dim = max(dims for _, nodes, dims in groups.blocks if len(nodes))
     if dim < 2:
         raise InputError(f"mesh file '{path}': it holds no elements of a body, neither in a plane nor in space.")
     points = np.asarray(groups.points, dtype=float)
     cells = np.unique(np.concatenate([nodes.ravel() for _, nodes, dims in groups.blocks if dims == dim]))
-    lost = cells[~np.isfinite(points[cells]).all(axis=1)]
+    lost = cells[~np.all(np.abs(points[cells]) < FAR, axis=1)]
     if len(lost):
-        raise InputError(f"mesh file '{path}': the coordinates of node {lost[0] + 1} are not finite numbers.")
+        raise InputError(f"mesh file '{path}': the coordinates of node {lost[0] + 1} are no numbers below {FAR:g}.")
     if dim == points.shape[1]:
         return dim, points.T
     spread = np.ptp(points[cells], axis=0)

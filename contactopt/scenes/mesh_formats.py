@@ -9,9 +9,13 @@ from __future__ import annotations
 
 import contextlib
 import io
+import pickle
+import subprocess
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +24,13 @@ from contactopt.errors import InputError
 LARGEST = 4_000_000_000  # bytes: a larger file holds more than can be solved
 # arrays of integers per element whose numbers are groups; those of others are named 'array=number'
 TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "su2:tag", "nastran:ref", "avsucd:material", "flac3d:group", "netgen:index")
+# formats whose readers end on a file that was cut off; those of others may wait for its end for ever
+SAFE = ("gmsh", "vtu", "vtk", "abaqus", "xdmf", "medit", "nastran", "med", "netgen", "avsucd")
+PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte
+CHILD = """import contextlib, pickle, sys, meshio
+with contextlib.redirect_stdout(sys.stderr):
+    mesh = meshio.read(sys.argv[1], file_format=sys.argv[2])
+pickle.dump(mesh, sys.stdout.buffer)"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +57,8 @@ def read_groups(path: Path) -> FileGroups:
     """Read a mesh file; InputError in one sentence, whatever is wrong with it."""
     mesh = _read(path)
     blocks = tuple((block.type, np.asarray(block.data), int(block.dim)) for block in mesh.cells)
+    if not any(len(nodes) for _, nodes, _ in blocks):
+        raise InputError(f"mesh file '{path}': it holds no elements.")
     for kind, nodes, _ in blocks:
         if nodes.size and (nodes.min() < 0 or nodes.max() >= len(mesh.points)):
             raise InputError(f"mesh file '{path}': a {kind} names a node that is not there.")
@@ -80,7 +93,7 @@ def _numbered(field_data: Mapping) -> list[tuple[str, tuple[int, int]]]:
     return [(name, tuple(value)) for name, value in field_data.items() if np.shape(value) == (2,)]
 
 
-def _read(path: Path):  # type: ignore[no-untyped-def]
+def _read(path: Path) -> Any:
     import meshio
 
     if not path.is_file():
@@ -96,18 +109,27 @@ def _read(path: Path):  # type: ignore[no-untyped-def]
             f"mesh file '{path}': its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp (Abaqus, CalculiX), ..."
         )
     said = ""
-    for name in formats:
+    for name in sorted(formats, key=lambda name: name not in SAFE):
         printed = io.StringIO()
         try:  # on a damaged file readers raise anything, print what is wrong, and end the process
             with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
-                mesh = meshio.read(path, file_format=name)
-                if len(mesh.points) and mesh.cells:
-                    return mesh
-                said = said or "it holds no elements"
+                return meshio.read(path, file_format=name) if name in SAFE else _read_apart(path, name, size)
         except (Exception, SystemExit) as error:
             text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
-            said = " ".join(text.split())[:200] or said or type(error).__name__
+            said = said or " ".join(text.split())[:200] or type(error).__name__
     raise InputError(
         f"mesh file '{path}' cannot be read as {' or '.join(formats)} ({said}); it is damaged or of another "
         "format" + ("; save Gmsh files in version 4.1 or 2.2." if "gmsh" in formats else ".")
     )
+
+
+def _read_apart(path: Path, name: str, size: int) -> Any:
+    """The mesh, read by a process that is stopped if it takes too long."""
+    command, patience = [sys.executable, "-c", CHILD, str(path), name], PATIENCE[0] + PATIENCE[1] * size
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=patience, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise ValueError(f"no end after {patience:.0f} s") from error
+    if done.returncode:
+        raise ValueError(done.stderr.decode(errors="replace").strip().splitlines()[-1])
+    return pickle.loads(done.stdout)
