@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,8 @@ from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
 from contactopt.solving.methods import default_method, find_method
 
+# What a run writes beside summary.json and one VTU file per body.
+RUN_FILES = ("deformed.png", "pressure.png", "path.png", "interface.npz", "history.csv", "path.npz")
 Note = Callable[[str], None]
 PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work")
 
@@ -126,7 +128,7 @@ def run(
     if out is None:
         return replace(made, summary=summary | _seconds(seconds, start))
     note("drawing figures, writing files")
-    with whole_folder(out) as folder:
+    with whole_folder(out, _earlier_files(Path(out))) as folder:
         with _clock(seconds, "figures"):
             _draw(made, folder)
         with _clock(seconds, "files"):
@@ -245,3 +247,21 @@ def _write(result: Result, folder: Path) -> None:
     )
     if result.path is not None:
         result.path.write(folder)
+
+
+def _earlier_files(folder: Path) -> set[str]:
+    """Names of the files that an earlier `contactopt run` wrote into the folder; empty where none has run.
+
+    A folder in which one has run holds its summary.json. Its other files have fixed names, but for one VTU file per body:
+    those are told from other people's by the field von_mises in them.
+    """
+    with suppress(OSError, ValueError, TypeError):
+        if "contact_nodes" in json.loads(_plain_text(folder / "summary.json")):
+            fields = {file.name for file in folder.glob("*.vtu") if '"von_mises"' in _plain_text(file)}
+            return fields | {name for name in RUN_FILES if (folder / name).exists()}
+    return set()
+
+
+def _plain_text(file: Path) -> str:
+    """What a regular file holds; nothing for links and devices."""
+    return "" if file.is_symlink() or not file.is_file() else file.read_text(errors="replace")

@@ -98,7 +98,7 @@ def test_a_start_around_a_closed_line_is_as_good_as_the_answer():
         problem,
         Q=problem.explicit().Q[np.ix_(rows, rows)],
         q=problem.q[order],
-        mu=problem.mu[order],
+        law=problem.law.select(order),
         V=problem.V[rows],
         areas=problem.areas[order],
         coordinates=problem.coordinates[:, order],

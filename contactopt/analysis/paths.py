@@ -192,7 +192,7 @@ def _step(
     q[:, 1:] -= earlier
     solution = solve(replace(problem, q=q), start=None if before is None else before.solution, **settings)
     now, gap = _mechanics(reduction, solution), np.zeros(q.shape)
-    gap[:, 0] = reduction.coupling.gap
+    gap[:, 0] = reduction.gap
     if last is None:  # the unloaded bodies
         last = _Mechanics(0 * now.r, gap, [0 * U for U in now.U], [0 * F for F in now.F])
     moved = problem.displacements(0 * now.r, solution.multipliers) - gap

@@ -165,6 +165,16 @@ def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, wei
     return Trace(nodes, areas, _clean(normals), W, corners)  # exact axes stay exact
 
 
+def face_nodes(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (face, j) of the faces of a boundary, corners first in cyclic order, and mean outward normals (dim, face)."""
+    name = basis.mesh.refdom.__name__
+    shape, places = SHAPES[name][1][degree](), FACES[name][2]
+    if degree == 1:
+        places = places[:, : FACES[name][1].doflocs.shape[0]]
+    at = _face_basis(basis.mesh, shape, boundary, (places, np.ones(places.shape[1])))
+    return _face_shapes(at, shape, boundary, places)[1], np.asarray(at.normals).mean(axis=2)
+
+
 def _cell_rule(
     name: str, places: np.ndarray, cells: np.ndarray, degree: int
 ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:

@@ -128,7 +128,7 @@ class Body(Protocol):
     name        its name in the scene
     unknowns    number of its free displacement unknowns, for tables
     at_rest     (n,) displacement at F = 0, lambda = 0 [length]
-    motions     (n, p) free motions
+    motions     (n, p) free motions, and motion_names, what each of them is, for messages
     resultants  (p,) work of the loads in the free motions [force]
     iterative   whether products cost iterations, so that a lower accuracy makes them cheaper
     complete    whether the entries of the compliance are cheap
@@ -146,6 +146,9 @@ class Body(Protocol):
 
     @property
     def motions(self) -> np.ndarray: ...
+
+    @property
+    def motion_names(self) -> tuple[str, ...]: ...
 
     @property
     def resultants(self) -> np.ndarray: ...

@@ -41,6 +41,10 @@ class RigidBody:
         return np.eye(len(self.components))[:, columns]
 
     @property
+    def motion_names(self) -> tuple[str, ...]:
+        return tuple(f"translation along {component}" for component in self._force)
+
+    @property
     def resultants(self) -> np.ndarray:
         return np.array(list(self._force.values()), dtype=float)
 
@@ -49,6 +53,8 @@ class RigidBody:
         return dict(self.part.force or {})
 
     def surface(self, name: str | None = None) -> Surface:
+        if name is not None:
+            raise InputError(f"rigid body '{self.name}' has no surface {name!r}; name the body alone in the contact.")
         raise InputError(f"rigid body '{self.name}' has no contact surface of its own; it needs a body with a mesh.")
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:

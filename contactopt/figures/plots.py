@@ -31,6 +31,8 @@ def magnification(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fiel
         return 1.0
     size = _reach(scene, fields) or max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
     target = 0.08 * size / displacement
+    if not 1.0 < target < np.inf:  # also where displacements are beyond all numbers
+        return 1.0
     power = 10.0 ** np.floor(np.log10(target))
     return float(max(1.0, power * max(m for m in (1, 2, 5) if m * power <= target)))
 

@@ -10,7 +10,7 @@ import numpy as np
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce
 from contactopt.scenes.meshes import graded, rename, simplices, tensor_mesh
 from contactopt.solving.preconditioners import deflated, preconditioner, smooth_motions
-from experiments.preconditioners import blocks, condition, iterations, solids
+from experiments.questions.preconditioners import blocks, condition, iterations, solids
 from experiments.report import write
 
 RUBBER = Material(5.0, 0.3)

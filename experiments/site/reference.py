@@ -40,6 +40,7 @@ ROOMS = {
     "analytic": "Exact solutions, against which the computed ones are held.",
     "problem": "The interface problem, its solution and its certificate: optimisation only.",
     "material": "The two constants of an elastic material.",
+    "files": "Files that are written whole or not at all.",
     "checks": "Checks of the numbers that a user gives.",
     "errors": "The two exceptions of the package.",
 }

@@ -22,11 +22,12 @@ from __future__ import annotations
 from importlib import import_module
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt.errors import InputError
-from contactopt.problem import InterfaceProblem
+from contactopt.problem import InterfaceProblem, part_of
 from contactopt.problem.operators import Interface, diagonal, held
 from contactopt.solving.preconditioners.grid import Product, grid_of
 
@@ -75,13 +76,15 @@ def find_preconditioner(name: str | None) -> None:
 
 
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
-    """The named approximate inverse of problem.Q, (k dim, k dim).
+    """The named approximate inverse of problem.Q, (k dim, k dim). Each pair of surfaces has its own block of it.
 
     Uses of Q only its mean diagonal and which components cannot move.
     Raises InputError for an unknown name, fewer than 3 contacts a side, or contacts not on a line or rectangular grid: the
     caller says what it does instead.
     """
     find_preconditioner(name)
+    if len(problem.pairs) > 1:
+        return _blocks(problem, [preconditioner(part_of(problem, pair), name) for pair in problem.pairs])
     still = held(problem.Q)
     mean = float(np.mean(diagonal(problem.Q)[~still])) if not still.all() else 1.0
     grid, order = grid_of(problem, still.reshape(problem.q.shape))
@@ -106,7 +109,28 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
     return Preconditioner(problem.q.size, on_grid(product, 1 / mean), model)
 
 
+def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Preconditioner:
+    """One preconditioner from those of the pairs of surfaces."""
+    rows = [slice(pair.first * problem.dim, pair.last * problem.dim) for pair in problem.pairs]
+
+    def product(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([part @ x[own] for part, own in zip(parts, rows)])
+
+    models = [part.model for part in parts if part.model is not None]
+
+    def model(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([part @ x[own] for part, own in zip(models, rows)])
+
+    return Preconditioner(problem.q.size, product, model if len(models) == len(parts) else None)
+
+
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
+    """Constant and linear motions of every pair of surfaces, (k dim, j)."""
+    parts = [_smooth_motions(part_of(problem, pair)) for pair in problem.pairs]
+    return np.asarray(la.block_diag(*parts))
+
+
+def _smooth_motions(problem: InterfaceProblem) -> np.ndarray:
     """(k dim, j <= dim^2): constant and linear functions of the place in every component: translations, tilts, stretches.
 
     On a closed line, which has no linear functions, the first cosine and sine take their place. Components that cannot move
