@@ -153,8 +153,7 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
     """Raise InputError unless all elements have volume and nowhere fold over, and no facet belongs to more than two."""
     places = np.asarray(mesh.elem().doflocs).T
     places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
-    volume = np.asarray(mesh._mapping().detDF(places))
-    volume = np.broadcast_to(volume, (mesh.nelements, places.shape[1]))
+    volume = np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1))
     size = np.linalg.norm(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** len(mesh.p)
     bad = np.flatnonzero((volume * np.sign(volume[:, -1:])).min(axis=1) <= FLAT * size)
     if len(bad):
