@@ -104,6 +104,10 @@ class RigidBody:
         """The total forces. What holds the other components does no work and is left out."""
         return np.asarray(self.motions @ self.resultants)
 
+    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Nothing: what holds a rigid body is what its contacts ask for."""
+        return {}
+
     def fields(self, U: np.ndarray) -> None:
         return None
 
