@@ -43,7 +43,7 @@ class Expression:
                 raise SyntaxError(f"it has more than {LONGEST} characters")
             tree = ast.parse(self.text, mode="eval").body
             with np.errstate(all="ignore"):
-                names = dict(zip(self.components, np.asarray(points, dtype=float))) | {"pi": np.float64(np.pi)}
+                names = dict(zip(self.components, np.array(points, dtype=float))) | {"pi": np.float64(np.pi)}
                 value = np.broadcast_to(np.asarray(_value(tree, names), dtype=float), points.shape[1:])
         except (SyntaxError, TypeError, ValueError, RecursionError, MemoryError) as error:
             said = error.msg if isinstance(error, SyntaxError) else str(error)
