@@ -215,7 +215,7 @@ def test_rigid_gap_must_be_finite():
 
 
 def test_two_rigid_bodies_are_refused():
-    with pytest.raises(InputError, match="both bodies of contact .* are rigid"):
+    with pytest.raises(InputError, match=r"both bodies of contact .* are rigid"):
         Scene("s", Rigid("a"), Rigid("b"), 0.1)
 
 

@@ -27,7 +27,9 @@ class Resultant:
         return {"force": self.force.tolist(), "moment": self.moment.tolist()}
 
 
-def resultant(points: np.ndarray, forces: np.ndarray, axisymmetric: bool, planes: tuple[SymmetryPlane, ...]) -> Resultant:
+def resultant(
+    points: np.ndarray, forces: np.ndarray, axisymmetric: bool, planes: tuple[SymmetryPlane, ...]
+) -> Resultant:
     """Resultant of nodal forces (dim, m) at points (dim, m), those of all mirror images together or of whole rings.
 
     Mirror images across `planes` and the parts of a ring balance each other but for what acts along the planes and along
@@ -39,8 +41,9 @@ def resultant(points: np.ndarray, forces: np.ndarray, axisymmetric: bool, planes
         n, apart = plane.inward[:, None], plane.inward @ points - plane.offset
         points = np.hstack([points, points - 2 * n * apart])
         forces = np.hstack([forces, forces - 2 * n * (plane.inward @ forces)]) / 2
-    turned = np.cross(points.T, forces.T).reshape(points.shape[1], -1)
-    return Resultant(forces.sum(axis=1), turned.sum(axis=0))
+    x, f = (np.pad(each, ((0, 3 - len(each)), (0, 0))) for each in (points, forces))
+    moment = np.cross(x, f, axis=0).sum(axis=1)
+    return Resultant(forces.sum(axis=1), moment if len(points) == 3 else moment[2:])
 
 
 def planes_of(reduction: Reduction) -> tuple[SymmetryPlane, ...]:

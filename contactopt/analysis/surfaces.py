@@ -13,6 +13,7 @@ from contactopt.analysis.status import contact_status
 from contactopt.interface.recovery import Fields
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution
+from contactopt.scenes.scene import Part
 
 NEAR = 1.5  # distances between contacts, beyond the gap, up to which a node of a body belongs to a contact
 CELLS = {2: "line", 3: "triangle", 4: "quad"}  # by their corners
@@ -86,22 +87,22 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
     return tuple(made)
 
 
-def on_nodes(reduction: Reduction, fields: tuple[Fields, ...], surfaces: tuple[ContactFields, ...]) -> tuple[Fields, ...]:
+def on_nodes(
+    reduction: Reduction, fields: tuple[Fields, ...], surfaces: tuple[ContactFields, ...]
+) -> tuple[Fields, ...]:
     """The fields of the bodies with the contact quantities at the nodes of their contact surfaces, zero elsewhere.
 
     A node takes the values of the contact nearest to it; traction and slip of a lower body have the opposite sign.
     """
-    parts = {part.name: part for part in reduction.scene.parts}
+    default = {part.name: part.contact for part in reduction.scene.parts if isinstance(part, Part)}
     made = []
     for body in fields:
-        data = {
-            name: np.zeros((body.mesh.nvertices, *value.shape[1:])) for name, value in surfaces[0].data.items()
-        }
+        data = {name: np.zeros((body.mesh.nvertices, *value.shape[1:])) for name, value in surfaces[0].data.items()}
         for pair, surface, coupling in zip(reduction.scene.pairs, surfaces, reduction.couplings):
             for side, (name, boundary) in enumerate(zip(pair.bodies, pair.surfaces)):
                 if name != body.name:
                     continue
-                facets = body.mesh.boundaries[boundary or parts[name].contact]
+                facets = body.mesh.boundaries[boundary or default[name]]
                 nodes = np.unique(body.mesh.facets[:, facets])
                 tree = KDTree(surface.points.T)
                 spacing = tree.query(surface.points.T, k=min(2, len(surface.gap)))[0].reshape(len(surface.gap), -1)

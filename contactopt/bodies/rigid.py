@@ -53,8 +53,6 @@ class RigidBody:
         return dict(self.part.force or {})
 
     def surface(self, name: str | None = None) -> Surface:
-        if name is not None:
-            raise InputError(f"rigid body '{self.name}' has no surface {name!r}; name the body alone in the contact.")
         raise InputError(f"rigid body '{self.name}' has no contact surface of its own; it needs a body with a mesh.")
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:

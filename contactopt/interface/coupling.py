@@ -70,7 +70,9 @@ class Coupling:
     planes: tuple[SymmetryPlane, ...]
 
 
-def couple(scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody, kind: str | None = None) -> Coupling:
+def couple(
+    scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody, kind: str | None = None
+) -> Coupling:
     """The coupling of a pair of surfaces of two assembled bodies.
 
     Parameters

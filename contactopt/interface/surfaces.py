@@ -36,9 +36,7 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
     chart, frames, order = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
     maps = [_map(m, i, mesh, held, frames, order) for i, mesh in enumerate(meshes)]
     areas, places, planes = m.areas[order], m.points[:, order], tuple(symmetry_planes(contacts))
-    return Coupling(
-        maps[0], maps[1], frames, m.gap[order], areas, places, chart, renumbered(cells, order), planes
-    )
+    return Coupling(maps[0], maps[1], frames, m.gap[order], areas, places, chart, renumbered(cells, order), planes)
 
 
 def _mesh(surface: Surface) -> Mesh:
