@@ -21,6 +21,8 @@ from contactopt.solving.backends import CONIC, QP
 from contactopt.solving.methods import METHODS, NATIVE
 from contactopt.solving.preconditioners import PRECONDITIONERS
 
+FORCES = {("mm", "MPa"): "N", ("m", "Pa"): "N", ("m", "kPa"): "kN", ("m", "MPa"): "MN", ("in", "psi"): "lbf"}
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code: 0 solved, 1 not solved, 2 bad input."""
@@ -126,10 +128,18 @@ def _run(options: argparse.Namespace) -> int:
     native = s["normal_backend"] == s["tangential_backend"] == NATIVE
     by = f", normal problem by {s['normal_backend']}, tangential by {s['tangential_backend']}"
     print(f"method {s['method']}" + ("" if native else by))
-    approach = "none (no plate)" if s["approach"] is None else f"{s['approach']:.6g} mm"
-    print(f"normal force {s['normal_force']:.6g} N, approach {approach}, largest pressure {s['max_pressure']:.6g} MPa")
+    length, stress = result.scene.units
+    force = FORCES.get((length, stress), f"{stress} {length}^2")
+    approach = "none (no plate)" if s["approach"] is None else f"{s['approach']:.6g} {length}"
+    print(
+        f"normal force {s['normal_force']:.6g} {force}, approach {approach}, "
+        f"largest pressure {s['max_pressure']:.6g} {stress}"
+    )
     if s["contact_half_width"] is not None:
-        print(f"contact half-width {s['contact_half_width']:.6g} mm, stick half-width {s['stick_half_width']:.6g} mm")
+        print(
+            f"contact half-width {s['contact_half_width']:.6g} {length}, "
+            f"stick half-width {s['stick_half_width']:.6g} {length}"
+        )
     if result.estimate is not None:
         _print_estimate(result.estimate)
     print(

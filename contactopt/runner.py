@@ -129,6 +129,23 @@ def run(
     backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
     form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
     options = Options(form, choose("solver", solver, "auto"), chosen, choose("tol", tol, 1e-8), note=note)
+    try:
+        return _finish(states, out, method, backends, options, accuracy, quantity, start)
+    except InputError as error:
+        raise error if file is None else file.located(error) from error
+
+
+def _finish(
+    states: tuple[Scene, ...],
+    out: str | Path | None,
+    method: str,
+    backends: tuple[str, str],
+    options: Options,
+    accuracy: float | None,
+    quantity: str | None,
+    start: float,
+) -> Result:
+    """Solve the states, and write figures and files; `start` is when the clock began."""
     if out is not None:
         check_folder(Path(out))
     solved, path, estimate = _solve(states, accuracy, quantity, options)
@@ -141,7 +158,7 @@ def run(
     )
     if out is None:
         return replace(made, summary=summary | _seconds(seconds, start))
-    note("drawing figures, writing files")
+    options.note("drawing figures, writing files")
     with whole_folder(out, _earlier_files(Path(out))) as folder:
         with _clock(seconds, "figures"):
             _draw(made, folder)

@@ -15,7 +15,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.material import Material
-from contactopt.scenes.body_shapes import LENGTHS, make_mesh
+from contactopt.scenes.body_shapes import make_mesh
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.expressions import Expression
 from contactopt.scenes.scene import COMPONENTS, BodyForce, Part, Plate, Rigid, Scene, Support, Traction
@@ -30,10 +30,21 @@ class SceneFile:
 
     states  the scene, or the states of its load path, which differ in their loads alone
     solve   arguments of contactopt.run: method, tol, accuracy, ...
+    name    of the file
+    lines   of bodies and contacts by their names
     """
 
     states: tuple[Scene, ...]
     solve: dict[str, Any]
+    name: str
+    lines: dict[str, int]
+
+    def located(self, error: InputError) -> InputError:
+        """The error with the line of the body or contact that it names, if it names one."""
+        for name, line in self.lines.items():
+            if f"'{name}'" in str(error):
+                return InputError(f"{self.name}, line {line}: {error}")
+        return InputError(f"{self.name}: {error}")
 
 
 @dataclass
@@ -83,7 +94,9 @@ def read_scene_file(path: str | Path) -> SceneFile:
         states.append(_scene(path, read_table(path), reading)[0])
     if count > 1 and "accuracy" in solve:
         raise table.fail("an accuracy can be asked for only without a load path.", "solve", "accuracy")
-    return SceneFile(tuple(states), solve)
+    lines = {pair.name: table.lines["contacts", i] for i, pair in enumerate(first.contacts)}
+    lines |= {part.name: table.lines["bodies", part.name] for part in first.bodies}
+    return SceneFile(tuple(states), solve, path.name, lines)
 
 
 def _scene(path: Path, top: Table, reading: _Reading | None) -> tuple[Scene, dict[str, Any], _Reading]:
@@ -107,6 +120,8 @@ def _scene(path: Path, top: Table, reading: _Reading | None) -> tuple[Scene, dic
     changes = {"thickness": top.number("thickness", 1.0, low=0.0), "name": top.text("name", path.stem)}
     for key, usual in (("copies", 1), ("degree", 2 if curved else 1)):
         changes[key] = top.take(key, int, "a whole number", usual)
+        if not 1 <= changes[key] <= (2 if key == "degree" else 1000):
+            raise top.fail(f"{key} must be {'1 or 2' if key == 'degree' else 'at least 1'}; got {changes[key]}.", key)
     solve = _solve(top.table("solve"))
     top.close()
     with top.about():
@@ -153,6 +168,8 @@ def _body(bodies: Table, name: str, reading: _Reading) -> Part | Rigid:
 def _rigid(name: str, table: Table, reading: _Reading) -> Rigid:
     normal, force = table.table("normal"), table.table("force")
     values = None if normal is None else _components(normal, reading)
+    if values is not None and not any(values.values()):
+        raise table.fail("the normal is zero; give the direction that points out of the rigid body.", "normal")
     gap = _function(table, "gap", reading)
     table.close()
     return Rigid(
