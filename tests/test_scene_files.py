@@ -191,7 +191,7 @@ MISTAKES = [
     ("tol = 1e-10", "accuracy = 0.1", 20, "belong together"),
     ("thickness = 2.0", "degree = 3", 2, "degree must be 1 or 2"),
     ('contact = "y-"', 'contact = "y-"\nsupports = [{ boundary = "x-" }]', 4, "body 'block': the plate on 'y\\+' moves"),
-    ("block = { x = [0, 2], y", "move = { x = 1e16 }\nblock = { x = [0, 2], y", 4, "body 'block'"),
+    ("block = { x = [0, 2], y", "move = { x = 1e16 }\nblock = { x = [0, 2], y", 5, "moved so far"),
     ("[solve]", "[solv]", 20, "there is no 'solv'"),
 ]  # fmt: skip
 

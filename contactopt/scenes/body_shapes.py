@@ -13,6 +13,7 @@ from contactopt.scenes.toml_table import Table
 # names of units of length -> metres
 LENGTHS = {"nm": 1e-9, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
 SHAPES = ("mesh", "block", "ring", "disc")
+FAR = 1e6  # distance from the origin over the size of a body, beyond which rounding deforms its elements
 MOST = 2_000_000  # elements of a structured body
 
 
@@ -40,6 +41,8 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
         step = [move.number(c, 0.0) for c in components]
         move.close()
         mesh = replace(mesh, doflocs=mesh.doflocs + np.array(step)[:, None])
+        if np.abs(mesh.doflocs).max() > FAR * np.ptp(mesh.doflocs, axis=1).min():
+            raise body.fail("the body is moved so far that rounding deforms it; keep it nearer to the origin.", "move")
     return mesh if places is None else _named(mesh, places, components)
 
 
