@@ -51,9 +51,7 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument("--method", help=", ".join(METHODS) + " (auto, or alternating if a backend is named)")
     run.add_argument("--normal", metavar="BACKEND", help="QP backend of the normal problem")
     run.add_argument("--tangential", metavar="BACKEND", help="QP (2D, axisymmetric) or conic (3D) backend")
-    run.add_argument(
-        "--q", metavar="FORM", help=", ".join(FORMS) + ": Q as an array or by its products"
-    )
+    run.add_argument("--q", metavar="FORM", help=", ".join(FORMS) + ": Q as an array or by its products")
     run.add_argument(
         "--preconditioner", metavar="NAME", help=", ".join(PRECONDITIONERS) + ", none; selects --q implicit"
     )

@@ -113,7 +113,7 @@ def run(
     InputError : on input that cannot be used, with a sentence that says what to do; nothing is left half-written
     """
     start = time.perf_counter()
-    file = read_scene_file(scene) if _is_file(scene) else None
+    file = None if isinstance(scene, Scene) or not str(scene).endswith(".toml") else read_scene_file(scene)
     told = {} if file is None else file.solve
 
     def choose(key: str, value: Any, usual: Any = None) -> Any:
@@ -167,10 +167,6 @@ def _finish(
         made = replace(made, summary=summary | _seconds(seconds, start))
         (folder / "summary.json").write_text(json.dumps(made.summary, indent=2) + "\n")
     return made
-
-
-def _is_file(scene: object) -> bool:
-    return isinstance(scene, Path) or (isinstance(scene, str) and scene.endswith(".toml"))
 
 
 def _states(scene: Any, changes: dict[str, Any]) -> tuple[Scene, ...]:

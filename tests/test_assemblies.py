@@ -48,7 +48,9 @@ def test_pin_becomes_hertz_and_fills_the_hole():
     assert small.half_width == pytest.approx(hertz.half_width, rel=1e-5)
     assert small.peak == pytest.approx(hertz.peak, rel=1e-5)
     large = analytic.pin_in_hole(1e9, 3.0, 0.01, 50.0)
-    assert np.degrees(large.half_width / 3.0) == pytest.approx(84.9, abs=0.1)  # half the contact angle without clearance
+    assert np.degrees(large.half_width / 3.0) == pytest.approx(
+        84.9, abs=0.1
+    )  # half the contact angle without clearance
     with pytest.raises(InputError, match="clearance"):
         analytic.pin_in_hole(1.0, 3.0, 0.0, 50.0)
 
@@ -87,7 +89,9 @@ def test_pin_in_bush_is_perssons():
     assert result.summary["contact_half_width"] == pytest.approx(scene.reference.half_width, rel=2e-3)
     assert result.summary["max_pressure"] == pytest.approx(scene.reference.peak, rel=3e-3)
     _, linear = errors(scene)
-    np.testing.assert_allclose(linear.summary["pairs"]["pin-bush"]["force"], [0, 100], atol=1e-8)  # statics, not the sum of normals
+    np.testing.assert_allclose(
+        linear.summary["pairs"]["pin-bush"]["force"], [0, 100], atol=1e-8
+    )  # statics, not the sum of normals
     assert linear.summary["normal_force"] > 110
 
 

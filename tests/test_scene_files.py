@@ -207,13 +207,17 @@ def test_a_mistake_is_named_with_its_line(tmp_path, capsys, right, wrong, line, 
 
 
 def test_missing_parts_are_named(tmp_path):
-    for text, message in (("", "there are no bodies"), ("[bodies]\n", "there are no bodies"), ("bodies = 3", "must be a table")):
+    for text, message in (
+        ("", "there are no bodies"),
+        ("[bodies]\n", "there are no bodies"),
+        ("bodies = 3", "must be a table"),
+    ):
         with pytest.raises(InputError, match=message):
             read_scene_file(written(tmp_path, text))
-    lonely = SMALL.replace("[[contacts]]", '[bodies.third]\nrigid = {}\n\n[[contacts]]')
+    lonely = SMALL.replace("[[contacts]]", "[bodies.third]\nrigid = {}\n\n[[contacts]]")
     with pytest.raises(InputError, match="'third' belongs to no contact"):
         read_scene_file(written(tmp_path, lonely))
-    with pytest.raises(InputError, match="line 4:.*cannot name a file"):
+    with pytest.raises(InputError, match=r"line 4:.*cannot name a file"):
         read_scene_file(written(tmp_path, SMALL.replace("[bodies.block]", '[bodies."../block"]')))
 
 

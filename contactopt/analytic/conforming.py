@@ -55,7 +55,9 @@ def pin_in_hole(force_per_length: float, radius: float, clearance: float, modulu
     return Reference("Persson", pressure, 2 * radius * float(np.arctan(b)), float(pressure(np.zeros(1))[0]))
 
 
-def press_fit(interference: float, bore: float, radius: float, outside: float, shaft: Material, hub: Material) -> Reference:
+def press_fit(
+    interference: float, bore: float, radius: float, outside: float, shaft: Material, hub: Material
+) -> Reference:
     """A shaft pressed into a hub that is too narrow for it, plane strain: Lame's uniform pressure p.
 
         d / (R p) = [(c^2 + R^2) / (c^2 - R^2) + m_h] / M_h + [(R^2 + a^2) / (R^2 - a^2) - m_s] / M_s,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from contactopt.analytic import contact_modulus, pin_in_hole
@@ -67,7 +69,14 @@ def pin_in_bush(
     symmetry = Support("start", {"x": 0.0}), Support("end", {"x": 0.0})
     return Scene(
         "pin-in-bush",
-        Part("pin", pin, material, (Support("axis", {"x": 0.0}),), (BodyForce(weight),), curve=_circle(radius - clearance)),
+        Part(
+            "pin",
+            pin,
+            material,
+            (Support("axis", {"x": 0.0}),),
+            (BodyForce(weight),),
+            curve=_circle(radius - clearance),
+        ),
         Part("bush", bush, material, (*symmetry, Support("outer")), curve=_circle(radius)),
         mu,
         thickness=depth,
@@ -232,7 +241,7 @@ def arch(
     names = [f"stone-{i + 1}" for i in range(stones)]
     bodies = [Part(name, mesh(i), material, loads=(load,), contact="start") for i, name in enumerate(names)]
     joints = [Contact(names[0], "right", mu)]
-    joints += [Contact(upper, f"{lower}:end", mu) for lower, upper in zip(names, names[1:])]
+    joints += [Contact(upper, f"{lower}:end", mu) for lower, upper in pairwise(names)]
     joints += [Contact(f"{names[-1]}:end", "left", mu)]
     return Scene(
         "arch",

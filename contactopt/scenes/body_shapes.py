@@ -25,7 +25,9 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
     if folder is None:
         return None
     if len(shapes) != 1:
-        raise body.fail(f"a body needs exactly one of mesh, block, ring, disc and rigid; this one has {' and '.join(shapes) or 'none'}.")
+        raise body.fail(
+            f"a body needs exactly one of mesh, block, ring, disc and rigid; this one has {' and '.join(shapes) or 'none'}."
+        )
     if shapes[0] == "mesh":
         mesh = _from_file(body, folder, group, _scale(body, unit, length))
     elif group or unit:
@@ -52,7 +54,10 @@ def _scale(body: Table, unit: str | None, length: str) -> float:
         return 1.0
     for name, where in ((unit, "this body"), (length, "the scene (units = { length = ..., stress = ... })")):
         if name not in LENGTHS:
-            raise body.fail(f"the unit of length of {where} is {name!r}; to convert it, it must be one of {', '.join(LENGTHS)}.", "unit")
+            raise body.fail(
+                f"the unit of length of {where} is {name!r}; to convert it, it must be one of {', '.join(LENGTHS)}.",
+                "unit",
+            )
     return LENGTHS[unit] / LENGTHS[length]
 
 
@@ -75,7 +80,7 @@ def _counts(table: Table, names: tuple[str, ...]) -> list[int]:
     counts = table.numbers("elements", len(names), f"the numbers of elements [{', '.join(names)}]")
     if not all(isinstance(count, int) and count >= 1 for count in counts) or np.prod(counts, dtype=float) > MOST:
         raise table.fail(f"'elements' must be whole numbers of at least 1, at most {MOST} elements in all.", "elements")
-    return counts
+    return [int(count) for count in counts]
 
 
 def _block(table: Table, components: tuple[str, ...]) -> Any:
@@ -93,7 +98,9 @@ def _ring(table: Table, components: tuple[str, ...]) -> Any:
     from contactopt.scenes.polar import ring
 
     radii = _grid(table, "radii", "two radii, [inner, outer]")
-    first, last = _grid(table, "angles", "two angles in degrees, [first, last]") if table.has("angles") else (0.0, 360.0)
+    first, last = (
+        _grid(table, "angles", "two angles in degrees, [first, last]") if table.has("angles") else (0.0, 360.0)
+    )
     if radii[0] <= 0 or last - first > 360:
         raise table.fail("the inner radius must be positive, and the angles at most 360 degrees apart.")
     across, around = _counts(table, ("across", "around"))
@@ -106,7 +113,11 @@ def _disc(table: Table, components: tuple[str, ...]) -> Any:
     from contactopt.scenes.polar import disc
 
     radius = table.number("radius", needed=True, low=0.0)
-    (around,) = _counts(table, ("around",)) if isinstance(table.data.get("elements"), list) else [table.take("elements", int, "a whole number", needed=True)]
+    (around,) = (
+        _counts(table, ("around",))
+        if isinstance(table.data.get("elements"), list)
+        else [table.take("elements", int, "a whole number", needed=True)]
+    )
     if around < 8 or around % 8 or around > 10_000:
         raise table.fail("'elements' around a disc must be a multiple of 8, at most 10000.", "elements")
     return disc(radius, around // 8)

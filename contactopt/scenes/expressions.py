@@ -69,6 +69,11 @@ def _value(node: ast.expr, names: Mapping[str, Any]) -> Any:
         return OPERATORS[type(node.op)](_value(node.operand, names))
     if isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in OPERATORS:
         return OPERATORS[type(node.ops[0])](_value(node.left, names), _value(node.comparators[0], names))
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS and not node.keywords:
+    if (
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in FUNCTIONS
+        and not node.keywords
+    ):
         return FUNCTIONS[node.func.id](*(_value(part, names) for part in node.args))
     raise SyntaxError(f"{ast.unparse(node)[:40]!r} is not known")

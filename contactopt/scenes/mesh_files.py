@@ -118,8 +118,10 @@ def name_boundaries(mesh: skfem.Mesh, places: Mapping[str, Mapping[int, tuple[fl
         for axis, (low, high) in limits.items():
             inside &= np.all((corners[axis] >= low - near) & (corners[axis] <= high + near), axis=0)
         if not inside.any():
-            low, high = text(mesh.p.min(axis=1)), text(mesh.p.max(axis=1))
-            raise InputError(f"no facet of the surface lies at boundary {name!r}; the body reaches from ({low}) to ({high}).")
+            first, last = text(mesh.p.min(axis=1)), text(mesh.p.max(axis=1))
+            raise InputError(
+                f"no facet of the surface lies at boundary {name!r}; the body reaches from ({first}) to ({last})."
+            )
         found[name] = facets[inside]
     return mesh.with_boundaries(found) if found else mesh
 

@@ -23,7 +23,16 @@ from contactopt.errors import InputError
 
 LARGEST = 4_000_000_000  # bytes: a larger file holds more than can be solved
 # arrays of integers per element whose numbers are groups; those of others are named 'array=number'
-TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "su2:tag", "nastran:ref", "avsucd:material", "flac3d:group", "netgen:index")
+TAGS = (
+    "gmsh:physical",
+    "medit:ref",
+    "cell_tags",
+    "su2:tag",
+    "nastran:ref",
+    "avsucd:material",
+    "flac3d:group",
+    "netgen:index",
+)
 # formats whose readers end on a file that was cut off; those of others may wait for its end for ever
 SAFE = ("gmsh", "vtu", "vtk", "abaqus", "xdmf", "medit", "nastran", "med", "netgen", "avsucd")
 PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte

@@ -123,7 +123,9 @@ def repaired(cells: Cells, merged: np.ndarray) -> Cells:
     sets = np.sort(merged[cells.corners], axis=0)
     flat = np.flatnonzero(np.any(np.diff(sets, axis=0) == 0, axis=0))
     if len(flat):
-        raise InputError(f"mesh file '{cells.path}': two corners coincide in {cells.name(flat[0])}; mesh this place anew.")
+        raise InputError(
+            f"mesh file '{cells.path}': two corners coincide in {cells.name(flat[0])}; mesh this place anew."
+        )
     once = np.sort(np.unique(sets, axis=1, return_index=True)[1])
     if len(once) < sets.shape[1]:
         log.warning("%s: %d elements are there twice and are dropped", cells.path, sets.shape[1] - len(once))
@@ -185,7 +187,7 @@ def _volumes(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     if simplex:
         axes = [c[:, i] - c[:, 0] for i in range(1, len(corners))]
     else:
-        ends = [((1, 2), (0, 3)), ((2, 3), (0, 1))]
+        ends: list[tuple[tuple[int, ...], tuple[int, ...]]] = [((1, 2), (0, 3)), ((2, 3), (0, 1))]
         if len(points) == 3:
             ends = [((1, 2, 5, 6), (0, 3, 4, 7)), ((2, 3, 6, 7), (0, 1, 4, 5)), ((4, 5, 6, 7), (0, 1, 2, 3))]
         axes = [c[:, list(b)].sum(axis=1) - c[:, list(a)].sum(axis=1) for b, a in ends]

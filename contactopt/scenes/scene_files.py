@@ -200,7 +200,9 @@ def _plate(table: Table, mesh: Any, reading: _Reading) -> Plate:
     boundary = _boundary(table, "boundary", mesh)
     force = table.table("force")
     if force is None:
-        raise table.fail(f"a plate needs force = {{ {reading.components[-1]} = ... }}: the total force on the whole body.")
+        raise table.fail(
+            f"a plate needs force = {{ {reading.components[-1]} = ... }}: the total force on the whole body."
+        )
     glued = table.take("glued", bool, "true or false", True)
     table.close()
     return Plate(boundary, _components(force, reading, whole=True), glued)
@@ -253,7 +255,7 @@ def _curve(table: Table | None, reading: _Reading) -> Callable[[np.ndarray], np.
 
 def _function(table: Table, key: str, reading: _Reading, needed: bool = False) -> Any:
     """A number, or a function of the place from an expression; None if there is none."""
-    value = table.take(key, (int, float, str), "a number, or a text like \"0.3 + 0.1 * x\"", needed=needed)
+    value = table.take(key, (int, float, str), 'a number, or a text like "0.3 + 0.1 * x"', needed=needed)
     if isinstance(value, str):
         with table.about(key):
             return Expression(value, reading.components)

@@ -30,7 +30,8 @@ class Table:
     """
 
     def __init__(self, file: str, lines: dict[Place, int], data: dict[str, Any], place: Place = ()):
-        self.file, self.lines, self.data, self.place, self.known = file, lines, data, place, []
+        self.file, self.lines, self.data, self.place = file, lines, data, place
+        self.known: list[str] = []
 
     def fail(self, message: str, *below: str | int) -> InputError:
         """The error to raise about this table, or about an entry of it."""
@@ -54,7 +55,9 @@ class Table:
         self.known.append(key)
         return key in self.data
 
-    def take(self, key: str, kind: type | tuple[type, ...], what: str, default: Any = None, needed: bool = False) -> Any:
+    def take(
+        self, key: str, kind: type | tuple[type, ...], what: str, default: Any = None, needed: bool = False
+    ) -> Any:
         """The entry, which must be of that type; `what` names the type in a message."""
         if not self.has(key):
             if needed:
@@ -96,7 +99,9 @@ class Table:
         found = self.take(key, list, "an array of tables, [{ name = value, ... }, ...]", [])
         for i, data in enumerate(found):
             if not isinstance(data, dict):
-                raise self.fail(f"every entry of {key!r} must be a table, {{ name = value, ... }}; got {short(data)}.", key, i)
+                raise self.fail(
+                    f"every entry of {key!r} must be a table, {{ name = value, ... }}; got {short(data)}.", key, i
+                )
         return [Table(self.file, self.lines, data, (*self.place, key, i)) for i, data in enumerate(found)]
 
     def close(self) -> None:
@@ -146,7 +151,8 @@ class _Lines:
     """One walk over the tokens of a TOML text."""
 
     def __init__(self, tokens: list[tuple[str, str | None, int]]):
-        self.tokens, self.at, self.found = tokens, 0, {}
+        self.tokens, self.at = tokens, 0
+        self.found: dict[Place, int] = {}
 
     def read(self) -> dict[Place, int]:
         prefix: Place = ()
@@ -175,7 +181,9 @@ class _Lines:
         parts: list[str] = []
         while self.tokens[self.at][1] != "mark":
             token, kind, _ = self.tokens[self.at]
-            parts += [tomllib.loads(f"x = {token}")["x"]] if kind == "text" else [part for part in token.split(".") if part]
+            parts += (
+                [tomllib.loads(f"x = {token}")["x"]] if kind == "text" else [part for part in token.split(".") if part]
+            )
             self.at += 1
         return parts
 
