@@ -21,6 +21,8 @@ def as_rst(lines: list[str]) -> list[str]:
             continue
         if kind == "section":
             if not re.fullmatch(r"-{3,}", line):
+                term = line[:1] != " " and (following[:1] == " " or re.match(r"[\w, ]+ : ", line) is not None)
+                out += [""] if term else []
                 out.append(f"    {_plain(line.strip())}" if line[:1] == " " else _plain(line))
             continue
         aligned = bool(line) and (line[0] == " " or re.search(r"\S {2,}\S", line) is not None)
