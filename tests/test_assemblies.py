@@ -95,7 +95,7 @@ def test_pin_in_bush_is_perssons():
     assert linear.summary["normal_force"] > 110
 
 
-@pytest.mark.parametrize("kind,degree,order", [("plane-strain", 1, 1.4), ("plane-strain", 2, 1.4), ("axisymmetric", 1, 1.8), ("axisymmetric", 2, 3.3)])  # fmt: skip
+@pytest.mark.parametrize("kind,degree,order", [("plane-strain", 1, 1.6), ("plane-strain", 2, 1.9), ("axisymmetric", 1, 1.8), ("axisymmetric", 2, 3.3)])  # fmt: skip
 def test_press_fit_converges_to_lame(kind, degree, order):
     found = [errors(scenes.press_fit(kind, interference=1e-7, elements=e), degree=degree)[0] for e in (4, 8, 16)]
     assert np.log2(found[0] / found[-1]) / 2 > order and found[-1] < 0.006
@@ -103,9 +103,16 @@ def test_press_fit_converges_to_lame(kind, degree, order):
 
 def test_press_fit_of_two_materials():
     scene = scenes.press_fit(shaft=Material(70e3, 0.33), hub=Material(110e3, 0.35), elements=24)
-    error, result = errors(scene, degree=2)
-    assert error < 2e-3
-    assert np.abs(result.traction[1:-1]).max() < 0.01 * scene.reference.peak
+    assert errors(scene, degree=2)[0] < 2e-3
+
+
+def test_press_fit_is_the_same_all_around():
+    """Nothing tells one node from another, nor the ends at the planes of symmetry, where normals lie in the plane."""
+    scene = scenes.press_fit(interference=1e-5, elements=6)
+    _, result = errors(scene)
+    np.testing.assert_allclose(result.pressure, result.pressure[0], rtol=1e-5)
+    np.testing.assert_allclose(result.traction, 0.0, atol=1e-6 * scene.reference.peak)
+    np.testing.assert_allclose(result.reduction.frames[[0, -1], 0], [[-1, 0], [0, -1]], atol=1e-15)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 5.0, -12.0])
