@@ -24,6 +24,20 @@ def couple_nodes(scene: Scene, pair: Contact, upper: AssembledBody, lower: Assem
 
     Frames and areas are those of the body that the contacts belong to. The contacts are numbered along the chart.
 
+    Parameters
+    ----------
+    scene
+        The kind of the scene and its law.
+    pair
+        The pair of surfaces.
+    upper, lower
+        The two bodies, of which at least one has a mesh.
+
+    Returns
+    -------
+    Coupling
+        One contact for each pair of nodes.
+
     Raises
     ------
     InputError

@@ -63,9 +63,22 @@ PATHS: dict[str, Callable[..., tuple[Scene, ...]]] = {
 
 
 def make_scene(name: str, *, degree: int | None = None, simplices: bool = False, **changes: object) -> Scene:
-    """The named scene with some of its arguments changed; InputError for an unknown name or argument.
+    """Make a named scene.
 
-    degree     of the displacement, 1 or 2, None for the scene's own;  simplices  triangles or tetrahedra instead of quadrilaterals or hexahedra
+    Parameters
+    ----------
+    name : a key of SCENES
+    degree : of the displacement in every element, 1 or 2; None: the scene's own
+    simplices : whether the meshes have triangles or tetrahedra instead of quadrilaterals or hexahedra
+    changes : other values of the arguments of the function that makes the scene
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InputError : for an unknown name or argument, and for values that the scene refuses
     """
     if name not in SCENES:
         raise InputError(f"unknown scene {name!r}; choose from {', '.join(SCENES)}.")
@@ -73,9 +86,20 @@ def make_scene(name: str, *, degree: int | None = None, simplices: bool = False,
 
 
 def make_path(name: str, *, degree: int | None = None, simplices: bool = False, **changes: object) -> tuple[Scene, ...]:
-    """The load path of a named scene, its arguments and those of its states changed; InputError if it has none.
+    """Make the load path of a named scene.
 
-    degree, simplices  as in make_scene
+    Parameters
+    ----------
+    name : a key of PATHS
+    degree, simplices, changes : as in make_scene()
+
+    Returns
+    -------
+    The states of the scene, in their order.
+
+    Raises
+    ------
+    InputError : for a scene without a load path, and as make_scene()
     """
     if name not in PATHS:
         raise InputError(f"scene {name!r} has no load path; choose from {', '.join(PATHS)}.")
