@@ -125,7 +125,8 @@ def _run(options: argparse.Namespace) -> int:
     print(f"method {s['method']}" + ("" if native else by))
     approach = "none (no plate)" if s["approach"] is None else f"{s['approach']:.6g} mm"
     print(f"normal force {s['normal_force']:.6g} N, approach {approach}, largest pressure {s['max_pressure']:.6g} MPa")
-    print(f"contact half-width {s['contact_half_width']:.6g} mm, stick half-width {s['stick_half_width']:.6g} mm")
+    if s["contact_half_width"] is not None:
+        print(f"contact half-width {s['contact_half_width']:.6g} mm, stick half-width {s['stick_half_width']:.6g} mm")
     if result.estimate is not None:
         _print_estimate(result.estimate)
     print(

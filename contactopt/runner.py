@@ -15,13 +15,15 @@ import numpy as np
 from contactopt.analysis.accuracy import Estimate, refine
 from contactopt.analysis.paths import PathResult, follow
 from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
+from contactopt.analysis.resultants import tables
 from contactopt.analysis.solve_scene import Options, Solved
+from contactopt.analysis.surfaces import contact_fields, on_nodes
 from contactopt.analysis.zone import solve_zone
 from contactopt.errors import InputError
 from contactopt.files import check_folder, whole_folder
 from contactopt.interface.recovery import Fields, recover
 from contactopt.interface.reduction import Reduction
-from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem import InterfaceProblem, Solution, alone, part_of
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
@@ -177,6 +179,8 @@ def _summary(
     """What is known of the answer but for the seconds: half-widths and pressure are the quantities that accuracy bounds."""
     reduction, solution = solved.reduction, solved.solution
     problem, r = reduction.problem, solution.reactions
+    found = tables(reduction, solution)
+    single = len(problem.pairs) == 1
     summary: dict[str, Any] = {
         "scene": reduction.scene.name,
         "dofs": reduction.dofs,
@@ -190,15 +194,17 @@ def _summary(
         "outer_iterations": solution.iterations,
         "normal_force": float(r[:, 0].sum()),
         "approach": approach(problem, solution),
-        "contact_half_width": width(reduction, solution),
-        "stick_half_width": stick_width(reduction, solution)[0],
-        "max_pressure": float((r[:, 0] / problem.areas).max()),
-        "pressure": peak_pressure(reduction, solution),
+        "contact_half_width": width(reduction, solution) if single else None,
+        "stick_half_width": stick_width(reduction, solution)[0] if single else None,
+        "max_pressure": max(pair["max_pressure"] for pair in found["pairs"].values()),
+        "pressure": peak_pressure(reduction, solution) if single else None,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
+        **found,
     }
     if path is not None:
-        summary |= {"states": len(path.states)} | {key: float(path.history[key][-1]) for key in PATH_KEYS}
+        keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]
+        summary |= {"states": len(path.states)} | {key: float(path.history[key][-1]) for key in keys}
     if estimate is not None:
         summary["accuracy"] = asdict(estimate)
     return summary
@@ -222,9 +228,12 @@ def _seconds(seconds: dict[str, float], start: float) -> dict[str, Any]:
 def _draw(result: Result, folder: Path) -> None:
     from contactopt import plots
 
-    picture = plots.deformed(result.scene, result.problem, result.fields)
+    problem, solution = result.problem, result.solution
+    picture = plots.deformed(result.scene, part_of(problem, problem.pairs[0]), result.fields)
     picture.figure.savefig(folder / "deformed.png", dpi=130)
-    plots.contact_figure(result.scene, result.problem, result.solution).savefig(folder / "pressure.png", dpi=130)
+    for pair in problem.pairs:
+        name = "pressure" if len(problem.pairs) == 1 else f"pressure-{pair.name}"
+        plots.contact_figure(result.scene, *alone(problem, solution, pair)).savefig(folder / f"{name}.png", dpi=130)
     if result.path is not None:
         from contactopt.figures.animation import path_figure
 
@@ -232,10 +241,14 @@ def _draw(result: Result, folder: Path) -> None:
 
 
 def _write(result: Result, folder: Path) -> None:
-    for fields in result.fields:
+    surfaces = contact_fields(result.reduction, result.solution)
+    for fields in on_nodes(result.reduction, result.fields, surfaces):
         fields.write_vtu(folder / f"{fields.name}.vtu")
+    for surface in surfaces:
+        surface.write_vtu(folder / f"contact-{surface.name}.vtu")
     problem, r = result.problem, result.solution.reactions
-    x = problem.chart.places.T if problem.dim == 3 else problem.chart.places[0]
+    places = np.concatenate([pair.chart.places for pair in problem.pairs], axis=1)
+    x = places.T if problem.dim == 3 else places[0]
     np.savez(
         folder / "interface.npz",
         x=x,  # along the contact surface

@@ -213,14 +213,14 @@ def _step(
 
 def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
     r = state.solution.reactions
-    status = contact_status(problem, r)
+    status, single = contact_status(problem, r), len(problem.pairs) == 1
     return {
         "normal_force": float(r[:, 0].sum()),
         "shear_force": -float(r[:, 1].sum()),
         "approach": -float(state.apart[0]),
         "shift": float(state.apart[1]),
-        "contact_half_width": contact_edge(state.scene, problem, r),
-        "stick_half_width": stick_edge(state.scene, problem, r, state.slip)[0],
+        "contact_half_width": contact_edge(state.scene, problem, r) if single else np.nan,
+        "stick_half_width": stick_edge(state.scene, problem, r, state.slip)[0] if single else np.nan,
         "contact_nodes": int(status.touching.sum()),
         "stick_nodes": int(status.stick.sum()),
         "slip_nodes": int(status.slip.sum()),

@@ -43,6 +43,7 @@ def peak_pressure(reduction: Reduction, solution: Solution) -> float:
     axisymmetric mesh the nodal value is some 1 % low, since the strain u_r / r is poorly resolved there, on a ring
     whose area counts for nothing. At the rim of the contact surface, and where the window has no room, the nodal value.
     """
+    _one_pair(reduction)
     problem = reduction.problem
     local, node, top = _around_the_peak(problem, solution)
     pressure = solution.reactions[:, 0] / problem.areas
@@ -87,14 +88,25 @@ def _around_the_peak(problem: InterfaceProblem, solution: Solution) -> tuple[np.
 
 def width(reduction: Reduction, solution: Solution) -> float:
     """Half-width of the contact zone [length], contact_edge()."""
+    _one_pair(reduction)
     return contact_edge(reduction.scene, reduction.problem, solution.reactions)
 
 
 def stick_width(reduction: Reduction, solution: Solution) -> tuple[float, float]:
     """Half-width of the stick zone and its uncertainty [length], stick_edge() with the slip of this solution."""
+    _one_pair(reduction)
     problem = reduction.problem
     slip = problem.displacements(solution.reactions, solution.multipliers)[:, 1:]
     return stick_edge(reduction.scene, problem, solution.reactions, slip)
+
+
+def _one_pair(reduction: Reduction) -> None:
+    """InputError if a scene has several pairs of surfaces, each with numbers of its own."""
+    if len(reduction.problem.pairs) > 1:
+        raise InputError(
+            f"scene '{reduction.scene.name}' has {len(reduction.problem.pairs)} pairs of surfaces, each with its own pressure and "
+            "half-widths; ask for the energy, or read them by pair (contactopt.analysis.resultants)."
+        )
 
 
 def stick_ratio(reduction: Reduction, solution: Solution) -> tuple[float, float]:

@@ -36,6 +36,7 @@ class Assembly:
     traces  name of each candidate contact boundary -> trace of the displacement there: nodes, areas, normals, weights, cells
     rigid   rigid motions that no support and no plate holds
     driven  what each column of `motion` is, for messages
+    holders name of each support and plate -> the unknowns that it holds or drives, each unknown with one of them
     """
 
     name: str
@@ -52,6 +53,7 @@ class Assembly:
     traces: Mapping[str, Trace]
     rigid: Motions
     driven: tuple[str, ...]
+    holders: Mapping[str, np.ndarray]
 
     @property
     def trace(self) -> Trace:
@@ -124,7 +126,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
             f"body '{part.name}': its mesh falls into {pieces} pieces; remove nodes that belong to no element, "
             "merge duplicated nodes, or model each piece as a body of its own."
         )
-    lift, held, motion, thrust, driven = _constraints(scene, part, basis)
+    lift, held, motion, thrust, driven, holders = _constraints(scene, part, basis)
     rigid = free_motions(scene.kind, scene.components, basis, node_unknowns(basis), held, weight)
     check_free(part.name, A, rigid)
     surfaces = scene.surfaces_of(part)
@@ -144,12 +146,13 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         contacts,
         rigid,
         driven,
+        holders,
     )
 
 
 def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     """The same body under the load values of another scene; InputError if other unknowns are held or driven there."""
-    lift, held, motion, thrust, _ = _constraints(scene, part, body.basis)
+    lift, held, motion, thrust, *_ = _constraints(scene, part, body.basis)
     if not np.array_equal(np.flatnonzero(~held), body.free) or not np.array_equal(motion, body.motion):
         raise InputError(f"body '{part.name}': supports or plates hold other unknowns than before; reduce it anew.")
     return replace(body, load=_load(part, body.basis, body.weight), lift=lift, thrust=thrust)
@@ -196,14 +199,20 @@ def _load(part: Part, basis: skfem.CellBasis, weight: tuple[float, bool]) -> np.
 
 def _constraints(
     scene: Scene, part: Part, basis: skfem.CellBasis
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, tuple[str, ...]]:
-    """Prescribed displacements, the mask of unknowns that are not free, plate motions, plate forces and plate names."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, tuple[str, ...], dict[str, np.ndarray]]:
+    """Prescribed displacements, mask of unknowns that are not free, plate motions, forces and names, and who holds what."""
     lift, held = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
     table = node_unknowns(basis)
 
     def unknowns(boundary: str, component: str) -> np.ndarray:
         there = basis.get_dofs(facets=np.asarray(basis.mesh.boundaries[boundary])).flatten()
         return np.intersect1d(there, table[scene.components.index(component)])
+
+    holders: dict[str, np.ndarray] = {}
+
+    def holds(name: str, where: np.ndarray) -> None:
+        known = np.concatenate([np.zeros(0, dtype=int), *holders.values()])
+        holders[name] = np.union1d(holders.get(name, known[:0]), np.setdiff1d(where, known))
 
     for support in part.supports:
         values = dict.fromkeys(scene.components, 0.0) if support.displacement is None else support.displacement
@@ -215,6 +224,7 @@ def _constraints(
                     "node where another support prescribes a different value."
                 )
             lift[where], held[where] = value, True
+            holds(f"support '{support.boundary}'", where)
     columns, thrust, names = [], [], []
     supported = held.copy()
     for plate in (load for load in part.loads if isinstance(load, Plate)):
@@ -239,6 +249,7 @@ def _constraints(
                     "drop the plate or the support."
                 )
             held[where] = True
+            holds(f"plate '{plate.boundary}'", where)
         supported = held.copy()
     motion = np.stack(columns, axis=1) if columns else np.zeros((basis.N, 0))
-    return lift, held, motion, np.array(thrust, dtype=float), tuple(names)
+    return lift, held, motion, np.array(thrust, dtype=float), tuple(names), holders

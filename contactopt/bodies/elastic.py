@@ -150,6 +150,16 @@ class ElasticBody:
         total = body.thrust + body.motion.T @ body.load
         return np.asarray(F + body.motion @ ((total - body.motion.T @ F) / body.motion.sum(axis=0)))
 
+    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        body, table = self.body, self.body.unknowns
+        F = body.A @ U - body.load - force
+        found = {}
+        for name, unknowns in body.holders.items():
+            own = np.zeros(len(F))
+            own[unknowns] = F[unknowns]
+            found[name] = body.locations, own[table]
+        return found
+
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
 

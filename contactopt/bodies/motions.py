@@ -18,7 +18,6 @@ Int. J. Numer. Meth. Engng 32, 1205-1227, for floating bodies whose motions are 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -143,7 +142,7 @@ def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: tuple[float, boo
     """Nodal forces (n,) of the field as a force per volume."""
 
     @skfem.LinearForm
-    def form(v: Any, w: Any) -> Any:
+    def form(v, w):  # type: ignore[no-untyped-def]
         return dot(w["field"], v) * weight_at(weight, w.x)
 
     return np.asarray(form.assemble(basis, field=basis.interpolate(field)))

@@ -180,6 +180,12 @@ class Body(Protocol):
     def external_forces(self, U: np.ndarray) -> np.ndarray:
         """Forces (n,) of loads, supports and plates on the body in equilibrium at the displacement U (n,)."""
 
+    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """For each support and plate its positions (dim, m) and the forces (dim, m) with which it acts on the body there.
+
+        U (n,) is the displacement under the contact forces `force` (n,).
+        """
+
     def fields(self, U: np.ndarray) -> Fields | None:
         """Displacement and stress at the displacement U (n,); None for a body without any."""
 

@@ -53,8 +53,6 @@ class RigidBody:
         return dict(self.part.force or {})
 
     def surface(self, name: str | None = None) -> Surface:
-        if name is not None:
-            raise InputError(f"rigid body '{self.name}' has no surface {name!r}; name the body alone in the contact.")
         raise InputError(f"rigid body '{self.name}' has no contact surface of its own; it needs a body with a mesh.")
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
@@ -103,6 +101,10 @@ class RigidBody:
     def external_forces(self, U: np.ndarray) -> np.ndarray:
         """The total forces. What holds the other components does no work and is left out."""
         return np.asarray(self.motions @ self.resultants)
+
+    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Nothing: what holds a rigid body is what its contacts ask for."""
+        return {}
 
     def fields(self, U: np.ndarray) -> None:
         return None

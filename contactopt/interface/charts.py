@@ -70,7 +70,7 @@ def lay_out(contacts: ContactPoints, copies: int, axisymmetric: bool) -> tuple[C
     axisymmetric
         Whether the first coordinate is the distance from an axis.
     """
-    planes = _symmetry_planes(contacts)
+    planes = symmetry_planes(contacts)
     mirrors = copies > 1
     if axisymmetric and contacts.points[0].min() <= NEAR * contacts.size:
         planes, mirrors = [SymmetryPlane(np.array([1.0, 0.0]), 0.0)], True
@@ -89,7 +89,7 @@ def _clockwise(normals: np.ndarray) -> np.ndarray:
     return np.stack([normals[1], -normals[0]])
 
 
-def _symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
+def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
     """The planes across one component on which exactly the tangential displacement along it is held."""
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
     for c, still in enumerate(held):

@@ -22,6 +22,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.protocol import AssembledBody, Surface
 from contactopt.errors import InputError
+from contactopt.interface.charts import SymmetryPlane
 from contactopt.problem.chart import Chart
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
@@ -55,6 +56,7 @@ class Coupling:
     positions     (dim, k) positions of the contacts in space [length]
     chart         places of the contacts on the contact surface
     cells         (v, c) contacts at the corners of the linear cells of the surface, for figures and files
+    planes        planes that cut the surface and on which the bodies are held along the normal only
     """
 
     upper: sp.csr_matrix
@@ -65,9 +67,12 @@ class Coupling:
     positions: np.ndarray
     chart: Chart
     cells: np.ndarray
+    planes: tuple[SymmetryPlane, ...]
 
 
-def couple(scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody, kind: str | None = None) -> Coupling:
+def couple(
+    scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody, kind: str | None = None
+) -> Coupling:
     """The coupling of a pair of surfaces of two assembled bodies.
 
     Parameters

@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from contactopt.bodies.protocol import AssembledBody, Surface
 from contactopt.errors import InputError
-from contactopt.interface.charts import ContactPoints, lay_out
+from contactopt.interface.charts import ContactPoints, lay_out, symmetry_planes
 from contactopt.interface.coupling import Coupling, local_map, renumbered
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
@@ -47,7 +47,8 @@ def couple_nodes(scene: Scene, pair: Contact, upper: AssembledBody, lower: Assem
     chart, frames, order = lay_out(points, scene.copies, scene.kind == "axisymmetric")
     upper_map, lower_map = local_map(first, partner[order], frames), local_map(second, order, frames)
     cells = renumbered(lead.cells, order)
-    return Coupling(upper_map, lower_map, frames, gap[order], lead.areas[order], lead.points[:, order], chart, cells)
+    areas, places, planes = lead.areas[order], lead.points[:, order], tuple(symmetry_planes(points))
+    return Coupling(upper_map, lower_map, frames, gap[order], areas, places, chart, cells, planes)
 
 
 def match(upper: Surface, lower: Surface) -> np.ndarray:

@@ -26,16 +26,17 @@ from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
 from contactopt.bodies.protocol import AssembledBody, Body, Product
 from contactopt.errors import InputError
-from contactopt.interface.costs import form_of
+from contactopt.interface.costs import LARGEST, form_of
 from contactopt.interface.coupling import Coupling, couple
 from contactopt.problem import InterfaceProblem, Law, Pair
 from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
-from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, estimate_diagonal, nodal_weights
+from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, dense, estimate_diagonal, nodal_weights
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
 log = logging.getLogger(__name__)
+SPARSE = 0.25  # share of the entries of Q that may be other than zero for it to be kept by sparse rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,24 +172,24 @@ def reduce_bodies(
     n = maps[0].shape[0]
     if Q == "auto":
         contact, largest = (max(getattr(b, size) for b in assembled) for size in ("interface_unknowns", "unknowns"))
-        if len(coupled) > 1:  # Q as an array holds all pairs; a product takes one with every body
-            contact, largest = n, sum(body.unknowns for body in assembled)
+        if _filling(maps) ** 0.5 > LARGEST:
+            contact = LARGEST + 1
         Q = form_of(contact, largest, scene.dim, any(b.iterates(solver) for b in assembled))
     log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, n)
     if Q == "explicit":
-        check_dense(n)
+        check_dense(round(_filling(maps) ** 0.5))
     bodies = each(lambda body: body.prepare(solver, Q == "explicit"), assembled)
     seconds["factorise"] = time.perf_counter() - start
 
     start = time.perf_counter()
     q, V, s = _linear_terms(bodies, maps, coupled)
-    made = _operator(bodies, maps, coupled) if Q == "implicit" else _array(bodies, maps)
+    made = _operator(bodies, maps, coupled) if Q == "implicit" else _entries(bodies, maps)
     areas = np.concatenate([part.areas for part in coupled])
     points = np.concatenate([part.positions for part in coupled], axis=1)
     pairs = _pairs(scene, coupled)
     chart = pairs[0].chart if len(pairs) == 1 else None
     law, names = _law(scene.pairs, coupled), _names(bodies)
-    problem = InterfaceProblem(made, q, law, V, s, areas, points, chart, pairs, names)  # type: ignore[arg-type]
+    problem = InterfaceProblem(made, q, law, V, s, areas, points, chart, pairs, names)
     seconds["compliance"] = time.perf_counter() - start
     return Reduction(scene, problem, bodies, maps, coupled, seconds)
 
@@ -259,19 +260,28 @@ def _operator(
     weights = [nodal_weights(made.chart, made.areas) for made in couplings]
     diagonal = estimate_diagonal(product, weights, np.any(moved, axis=0))
     complete, iterative = all(body.complete for body in bodies), any(body.iterative for body in bodies)
-    entries = (lambda: _array(bodies, maps)) if complete else None
+    entries = (lambda: dense(_entries(bodies, maps))) if complete else None
     return InterfaceOperator(product, diagonal, entries, None, iterative)
 
 
-def _array(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarray:
-    """Q as an array, symmetric to the last digit."""
+def _filling(maps: Sequence[sp.csr_matrix]) -> int:
+    """Number of the entries of Q between contacts that share a body."""
+    return min(sum(len(_rows(B)) ** 2 for B in maps), maps[0].shape[0] ** 2)
+
+
+def _entries(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarray | sp.csr_array:
+    """Q by its entries, symmetric to the last digit: an array, or sparse rows where most pairs share no body."""
     n = maps[0].shape[0]
-    Q = np.zeros((n, n))
+    thin = _filling(maps) < SPARSE * n**2
+    Q = sp.csr_array((n, n)) if thin else np.zeros((n, n))
     for body, B in zip(bodies, maps):
         if not body.moved(B).any():
             continue
         rows = _rows(B)
-        if len(rows) == n:
+        if thin:
+            place = np.repeat(rows, len(rows)), np.tile(rows, len(rows))
+            Q = Q + sp.csr_array((body.compliance(B[rows]).ravel(), place), (n, n))
+        elif len(rows) == n:
             Q += body.compliance(B)
         else:
             Q[np.ix_(rows, rows)] += body.compliance(B[rows])

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.protocol import AssembledBody, Mesh, Surface
 from contactopt.errors import InputError
-from contactopt.interface.charts import ContactPoints, lay_out
+from contactopt.interface.charts import ContactPoints, lay_out, symmetry_planes
 from contactopt.interface.coupling import Coupling, renumbered
 from contactopt.interface.faces import Faces, faces_of
 from contactopt.interface.mortar import Mortar, mortar
@@ -35,7 +35,8 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
     contacts = ContactPoints(m.points, m.normals, m.areas, cells, held & still, m.gap)
     chart, frames, order = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
     maps = [_map(m, i, mesh, held, frames, order) for i, mesh in enumerate(meshes)]
-    return Coupling(maps[0], maps[1], frames, m.gap[order], m.areas[order], m.points[:, order], chart, renumbered(cells, order))
+    areas, places, planes = m.areas[order], m.points[:, order], tuple(symmetry_planes(contacts))
+    return Coupling(maps[0], maps[1], frames, m.gap[order], areas, places, chart, renumbered(cells, order), planes)
 
 
 def _mesh(surface: Surface) -> Mesh:

@@ -89,7 +89,9 @@ class InterfaceProblem:
         if (law is None) == (mu is None):
             raise InputError("give either a law or a friction coefficient mu.")
         given = {"Q": Q, "q": q, "law": mu if law is None else law, "V": V, "s": s, "areas": areas}
-        for name, value in (given | {"coordinates": coordinates, "chart": chart, "pairs": pairs, "motions": motions}).items():
+        for name, value in (
+            given | {"coordinates": coordinates, "chart": chart, "pairs": pairs, "motions": motions}
+        ).items():
             object.__setattr__(self, name, value)
         self._check()
 

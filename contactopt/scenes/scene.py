@@ -258,6 +258,11 @@ class Scene:
             if [other.name for other in pairs].count(pair.name) > 1:
                 raise InputError(f"scene '{self.name}': contact '{pair.name}' is given twice.")
             rigid = [isinstance(self.parts[names.index(name)], Rigid) for name in pair.bodies]
+            for name, surface, stiff in zip(pair.bodies, pair.surfaces, rigid):
+                if stiff and surface is not None:
+                    raise InputError(
+                        f"scene '{self.name}': rigid body '{name}' has no surface {surface!r}; name the body alone."
+                    )
             if all(rigid):
                 raise InputError(
                     f"scene '{self.name}': both bodies of contact '{pair.name}' are rigid; at least one must be elastic."
