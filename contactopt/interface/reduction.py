@@ -116,7 +116,12 @@ class Reduction:
 
 
 def reduce(
-    scene: Scene, elements: int | None = None, zone: float | None = None, Q: str = "auto", solver: str = "auto"
+    scene: Scene,
+    elements: int | None = None,
+    zone: float | None = None,
+    Q: str = "auto",
+    solver: str = "auto",
+    coupling: str | None = None,
 ) -> InterfaceProblem:
     """The interface problem of a scene.
 
@@ -133,13 +138,16 @@ def reduce(
         the cheaper one (contactopt.interface.costs).
     solver
         Of the bodies' linear systems: 'auto' or a name in contactopt.bodies.solvers.SOLVERS.
+    coupling
+        'auto' or a name in contactopt.interface.coupling.COUPLINGS for all pairs of surfaces; by default each has its own,
+        which is 'auto' unless its Contact says otherwise: matching nodes where they match, mortar where they do not.
 
     Raises
     ------
     InputError
-        On input that cannot be modelled: unknown boundaries, nodes that do not match.
+        On input that cannot be modelled: unknown boundaries, surfaces that face each other nowhere.
     """
-    return reduce_bodies(scene, elements, zone, Q, solver).problem
+    return reduce_bodies(scene, elements, zone, Q, solver, coupling).problem
 
 
 def reduce_bodies(
@@ -152,8 +160,7 @@ def reduce_bodies(
 ) -> Reduction:
     """As reduce(), keeping the bodies for recovery.
 
-    The bodies are made solvable at the same time. `coupling` is a name in contactopt.interface.coupling.COUPLINGS for all
-    pairs of surfaces; by default each has its own.
+    The bodies are made solvable at the same time.
     """
     if Q not in FORMS:
         raise InputError(f"unknown form of Q {Q!r}; choose from {', '.join(FORMS)}.")
