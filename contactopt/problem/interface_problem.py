@@ -126,7 +126,9 @@ class InterfaceProblem:
             object.__setattr__(self, "chart", Chart.of_points(self.coordinates, dim))
         elif self.chart.places.shape != (dim - 1, k):
             raise InputError(f"the chart must have places of shape {(dim - 1, k)}; got {self.chart.places.shape}.")
-        pairs = self.pairs or (Pair("contact", 0, k, self.chart),)
+        pairs = self.pairs
+        if len(pairs) < 2:  # the only pair is all of the problem, whatever was replaced in it
+            pairs = (Pair(pairs[0].name if pairs else "contact", 0, k, self.chart),)
         if [pair.first for pair in pairs] + [k] != [0] + [pair.last for pair in pairs]:
             raise InputError(f"the pairs of surfaces must follow each other from contact 0 to contact {k - 1}.")
         object.__setattr__(self, "pairs", pairs)
