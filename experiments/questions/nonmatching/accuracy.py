@@ -12,7 +12,7 @@ from contactopt.analysis.quantities import stick_width
 from contactopt.scenes import round as round_bodies
 from contactopt.scenes.sliding import _sheared
 from experiments.questions.cattaneo import error
-from experiments.questions.nonmatching.bodies import apart, press_fit, punch, stiff_punch
+from experiments.questions.nonmatching.bodies import apart, carried, press_fit, punch, stiff_punch
 
 METHODS = ("newton", "auto")
 FINE = 192
@@ -119,15 +119,29 @@ def steps(found: dict[str, Any]) -> dict[str, Any]:
     return {"newton: steps": newton.iterations, "newton": newton.status.label, "auto": auto.status.label}
 
 
-def sheared(sizes: tuple[int, int], degree: int, shear: float, carrier: str | None) -> dict[str, Any]:
-    """Pressed, then sheared: L2 errors of pressure and traction."""
+def sheared(sizes: tuple[int, int], degree: int, shear: float, carrier: str) -> tuple[float, float, bool]:
+    """Cattaneo and Mindlin's cylinders pressed, then sheared: L2 errors of pressure and traction."""
     scene = apart(scenes.cattaneo(2, shear=shear), *sizes, degree)
-    states: list[Scene] = [_sheared(scene, share) for share in (0.0, 1.0)]
-    path = follow(states, coupling_carrier=carrier) if False else follow(states)
+    path = follow([carried(_sheared(scene, share), carrier) for share in (0.0, 1.0)])
     problem, r = path.reduction.problem, path.solution.reactions
-    x = np.abs(problem.coordinates[0])
-    return {
-        "p": error(r[:, 0] / problem.areas, scene.reference.pressure(x), problem.areas),
-        "q": error(-r[:, 1] / problem.areas, scene.reference.shear(x), problem.areas),
-        "solved": path.solved,
-    }
+    x, exact = np.abs(problem.coordinates[0]), scene.reference
+    p = error(r[:, 0] / problem.areas, exact.pressure(x), problem.areas)
+    return p, error(-r[:, 1] / problem.areas, exact.shear(x), problem.areas), path.solved
+
+
+def cattaneo() -> list[dict[str, Any]]:
+    """Root mean squares of both errors over several shears, each on meshes made for it."""
+    rows = []
+    for degree in (1, 2):
+        for sizes in ((16, 16), (24, 24), (16, 24), (24, 16)):
+            carriers = ("lower",) if sizes[0] == sizes[1] else ("upper", "lower")
+            for carrier in carriers:
+                found = [sheared(sizes, degree, shear, carrier) for shear in SHEARS]
+                own, other = sizes if carrier == "upper" else sizes[::-1]
+                on = "" if own == other else "fine side" if own > other else "coarse side"
+                row: dict[str, Any] = {"degree": degree, "elements": f"{sizes[0]}:{sizes[1]}", "contacts on": on}
+                row |= {"p in L2": float(np.sqrt(np.mean([f[0] ** 2 for f in found])))}
+                row |= {"q in L2": float(np.sqrt(np.mean([f[1] ** 2 for f in found])))}
+                row |= {f"q at T = {shear:g} N": found[i][1] for i, shear in enumerate(SHEARS)}
+                rows.append(row | {"solved": all(f[2] for f in found)})
+    return rows
