@@ -49,9 +49,7 @@ def couple_nodes(scene: Scene, pair: Contact, upper: AssembledBody, lower: Assem
     upper_map, lower_map = local_map(first, partner[order], frames), local_map(second, order, frames)
     cells = renumbered(lead.cells, order)
     areas, places, planes = lead.areas[order], lead.points[:, order], tuple(symmetry_planes(points))
-    return Coupling(
-        upper_map, lower_map, frames, gap[order], areas, places, chart, cells, planes, "matching", carrier
-    )
+    return Coupling(upper_map, lower_map, frames, gap[order], areas, places, chart, cells, planes, "matching", carrier)
 
 
 def match(upper: Surface, lower: Surface) -> np.ndarray:

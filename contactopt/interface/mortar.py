@@ -35,6 +35,12 @@ contains the gap itself, but at most an eighth of the size of a face (levers.SHA
 its radius by about that much, so that polygons are in equilibrium whether their curve is known or not, and the rest of a
 larger gap is left to the geometry. In an axisymmetric scene moments vanish by symmetry, and no lever is needed.
 
+**Kinks of linear elements.** With linear elements on the other side, W' has a further term, which rounds off the kinks of its
+displacement (contactopt.interface.kinks): otherwise finer contacts would follow them, and pressures converge in first order.
+
+**Frames.** Normals are those of the lower body, whichever side carries the contacts: as everywhere, and so that the answer
+does not depend on the choice.
+
 **Contacts that are supported.** Where a support holds a component at a contact's node, that component of u_i is taken from
 this node alone, and from the other body at the place that faces it (`alone`); on a plane of symmetry both are at
 rest. The cone of the contact is untouched.

@@ -42,7 +42,7 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
     areas, places, planes = m.areas[order], m.points[:, order], tuple(symmetry_planes(contacts))
     cells, carrier = renumbered(cells, order), SIDES[m.own]
     log.info("contact '%s': mortar, %d contacts on the %s body '%s'", pair.name, len(order), carrier, sides[m.own].name)
-    return Coupling(*maps, frames, m.gap[order], areas, places, chart, cells, planes, "mortar", carrier)
+    return Coupling(maps[0], maps[1], frames, m.gap[order], areas, places, chart, cells, planes, "mortar", carrier)
 
 
 def _mesh(surface: Surface) -> Mesh:

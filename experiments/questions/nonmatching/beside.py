@@ -44,7 +44,9 @@ def beside() -> list[dict[str, Any]]:
         for law, factor in LAWS.items():
             stiffness = factor * STIFF * force / length**2 * SIZES[0] / (20.0 * length)
             stick = stiffness if law == "mortar" else STICK * stiffness
-            found = [run(program, model(scene), reduction, Contact(law, stiffness, stick, "top")) for _ in range(REPEATS)]
+            found = [
+                run(program, model(scene), reduction, Contact(law, stiffness, stick, "top")) for _ in range(REPEATS)
+            ]
             rows.append(units | _row(law, found, last, reduction, force))
     return rows
 

@@ -67,9 +67,7 @@ def press_fit(sectors: tuple[int, int], degree: int, carrier: str, mu: float = 0
             mesh = skfem.MeshQuad2.from_mesh(mesh)
         r, phi = mesh.doflocs
         mesh = type(mesh)(np.stack([r * np.cos(phi), r * np.sin(phi)]), mesh.t).with_boundaries(boundaries)
-        return Part(
-            name, mesh, MATERIAL, sides, contact=contact, curve=lambda x: np.asarray(radius * x / np.hypot(*x))
-        )
+        return Part(name, mesh, MATERIAL, sides, contact=contact, curve=lambda x: np.asarray(radius * x / np.hypot(*x)))
 
     outer = part("outer", 2, 3, sectors[0], "inner", 2 - interference / 2)
     inner = part("inner", 1, 2, sectors[1], "outer", 2 + interference / 2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from statistics import median
 from typing import Any
 
@@ -46,7 +47,10 @@ def tied(reduction: Reduction) -> Callable[[], np.ndarray]:
     E = sp.csr_matrix(
         (
             np.concatenate([np.ones(len(kept)), entries.data]),
-            (np.concatenate([kept, mine[entries.row]]), np.concatenate([np.arange(len(kept)), number[used][entries.col]])),
+            (
+                np.concatenate([kept, mine[entries.row]]),
+                np.concatenate([np.arange(len(kept)), number[used][entries.col]]),
+            ),
         ),
         (n, len(kept)),
     )
@@ -73,8 +77,8 @@ def costs() -> list[dict[str, Any]]:
         for _ in range(REPEATS):
             reduction = None  # frees its factors
             _, one, one_cpu = timed(linear)
-            reduction, _, cpu = timed(lambda: reduce_bodies(scene, solver="superlu"))
-            solution, spent, spent_cpu = timed(lambda: solve(reduction.problem, tol=1e-8))
+            reduction, _, cpu = timed(partial(reduce_bodies, scene, solver="superlu"))
+            solution, spent, spent_cpu = timed(partial(solve, reduction.problem, tol=1e-8))
             assemble = reduction.seconds["assemble"]
             whole = sum(reduction.seconds.values()) - assemble + spent
             runs.append((one, assemble, whole, whole / one, (cpu - assemble + spent_cpu) / one_cpu))

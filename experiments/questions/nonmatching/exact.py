@@ -45,14 +45,18 @@ def resultants(reduction: Reduction, reactions: np.ndarray) -> tuple[float, floa
 def equilibrium() -> list[dict[str, Any]]:
     """Of solved scenes, and of random contact forces on the same curved surfaces."""
     rows = []
-    found = {f"press fit, degree {d}, {c} carries": press_fit((8, 12), d, c, 0.3)[0] for d in (1, 2) for c in ("upper", "lower")}
+    found = {
+        f"press fit, degree {d}, {c} carries": press_fit((8, 12), d, c, 0.3)[0]
+        for d in (1, 2)
+        for c in ("upper", "lower")
+    }
     found["elastic punch"] = apart(punch(), 16, 24)
     for name, scene in found.items():
         reduction = reduce_bodies(scene)
         r = solve(reduction.problem).reactions
         random = np.random.default_rng(0).normal(size=r.shape)
-        on_plane = np.any(np.abs(reduction.problem.coordinates) < 1e-9, axis=0)
-        random[on_plane] = 0.0  # a plane of symmetry takes a part of these
+        for plane in reduction.coupling.planes:  # which takes a part of the forces there
+            random[np.abs(plane.inward @ reduction.problem.coordinates - plane.offset) < 1e-9] = 0.0
         row: dict[str, Any] = {"scene": name}
         for label, forces in (("solved", r), ("random forces", random)):
             row[f"{label}: force"], row[f"{label}: moment"] = resultants(reduction, forces)
