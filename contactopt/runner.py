@@ -265,13 +265,17 @@ def _write(result: Result, folder: Path) -> None:
 def _earlier_files(folder: Path) -> set[str]:
     """Names of the files that an earlier `contactopt run` wrote into the folder; empty where none has run.
 
-    A folder in which one has run holds its summary.json. Its other files have fixed names, but for one VTU file per body:
-    those are told from other people's by the field von_mises in them.
+    A folder in which one has run holds its summary.json. Its other files have fixed names, but for a VTU file per body and
+    per pair of surfaces, told from other people's by the fields in them, and pictures of the pairs that the summary names.
     """
     with suppress(OSError, ValueError, TypeError):
-        if "contact_nodes" in json.loads(_plain_text(folder / "summary.json")):
-            fields = {file.name for file in folder.glob("*.vtu") if '"von_mises"' in _plain_text(file)}
-            return fields | {name for name in RUN_FILES if (folder / name).exists()}
+        summary = json.loads(_plain_text(folder / "summary.json"))
+        if "contact_nodes" in summary:
+            marks = ('"von_mises"', '"contact_pressure"')
+            found = {file.name for file in folder.glob("*.vtu") if any(mark in _plain_text(file) for mark in marks)}
+            pictures = {f"pressure-{pair}.png" for pair in summary.get("pairs", {})}
+            found |= {file.name for file in folder.glob("pressure-*.png") if file.name in pictures}
+            return found | {name for name in RUN_FILES if (folder / name).exists()}
     return set()
 
 

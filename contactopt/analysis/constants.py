@@ -7,7 +7,7 @@ experiments.cost_ratio` what the start from a coarse mesh saves.
 # Reading edges and peaks (contactopt.analysis.edges, contactopt.analysis.quantities).
 SMOOTH = 3, 6  # rings of nodes left out and fitted where contact ends by itself: the outermost carry most of the error
 NEAR = 1, 2  # the same where the values are straight only next to the edge
-INNER = 0.0, 0.5  # shares of the half-width from which on the squared pressure on a line is fitted, in turn
+INNER = 0.3  # share of the half-width from which on the squared pressure on a line is fitted
 OUTER = 2  # nodes next to the edge of contact that this fit leaves out
 WINDOW = 0.5  # share of the distance from the largest pressure to the edge over which the peak is fitted
 
