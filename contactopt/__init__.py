@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from contactopt.problem.transfer import transfer
     from contactopt.runner import Result, run
     from contactopt.scenes.contact import Contact
+    from contactopt.scenes.mesh_files import load_mesh
     from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
     from contactopt.solving.driver import solve
 
@@ -44,6 +45,7 @@ _HOMES = {
     "runner": ("Result", "run"),
     "material": ("Material",),
     "scenes.contact": ("Contact",),
+    "scenes.mesh_files": ("load_mesh",),
     "scenes.scene": ("BodyForce", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
     "solving.driver": ("solve",),
 }

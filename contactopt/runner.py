@@ -27,6 +27,7 @@ from contactopt.problem import InterfaceProblem, Solution, alone, part_of
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
+from contactopt.scenes.scene_files import read_scene_file, with_degree
 from contactopt.solving.methods import default_method, find_method
 
 # What a run writes beside summary.json and one VTU file per body.
@@ -71,16 +72,16 @@ class Result:
 
 
 def run(
-    scene: str | Scene,
+    scene: str | Path | Scene,
     out: str | Path | None = None,
     *,
     method: str | None = None,
     normal: str | None = None,
     tangential: str | None = None,
     preconditioner: str | None = None,
-    Q: str = "auto",
-    solver: str = "auto",
-    tol: float = 1e-8,
+    Q: str | None = None,
+    solver: str | None = None,
+    tol: float | None = None,
     elements: int | None = None,
     accuracy: float | None = None,
     quantity: str | None = None,
@@ -91,32 +92,64 @@ def run(
 
     Parameters
     ----------
-    scene : a name (see contactopt.scenes.SCENES), which is solved along its load path if it has one (PATHS); or a Scene
+    scene : a name (see contactopt.scenes.SCENES), which is solved along its load path if it has one (PATHS); a scene file, whose
+        name ends in .toml; or a Scene
     out : folder for the files; None: nothing is written
     method, normal, tangential : names; by default `auto`, or `alternating` if a backend is named
     preconditioner : a name in contactopt.solving.preconditioners, of methods that take products with Q; it selects
         Q = 'implicit'
-    Q, solver : form of Q and solver of the bodies, see reduce()
-    tol : bound on the natural-map residual
+    Q, solver : form of Q and solver of the bodies, see reduce(); 'auto' by default
+    tol : bound on the natural-map residual; 1e-8 by default
     elements : across the contact half-width
     accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
         sentence in `Result.estimate` says why not; `elements` only scales the first mesh
     quantity : a name in contactopt.analysis.quantities.QUANTITIES
+        All arguments from `method` to here may stand in a scene file; those given here win.
     note : receives progress messages
     changes : to the arguments of a named scene, or to the fields of a Scene
+
+    Returns
+    -------
+    Result : the solution with its interface problem, the fields of the bodies, and a summary
 
     Raises
     ------
     InputError : on input that cannot be used, with a sentence that says what to do; nothing is left half-written
     """
     start = time.perf_counter()
-    states = _states(scene, changes | ({} if elements is None else {"elements": elements}))
+    file = None if isinstance(scene, Scene) or not str(scene).endswith(".toml") else read_scene_file(scene)
+    told = {} if file is None else file.solve
+
+    def choose(key: str, value: Any, usual: Any = None) -> Any:
+        return told.get(key, usual) if value is None else value
+
+    changes |= {} if elements is None else {"elements": elements}
+    states = _states(scene, changes) if file is None else with_degree(file, changes)
     names = {"normal": normal, "tangential": tangential, "preconditioner": preconditioner}
-    given = {key: name for key, name in names.items() if name is not None}
-    method = method or default_method(given)
+    given = {key: choose(key, name) for key, name in names.items() if choose(key, name) is not None}
+    method = choose("method", method) or default_method(given)
+    accuracy, quantity = choose("accuracy", accuracy), choose("quantity", quantity)
     chosen = find_method(method, **given)
     backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
-    options = Options(_form(Q, preconditioner), solver, chosen, tol, note=note)
+    form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
+    options = Options(form, choose("solver", solver, "auto"), chosen, choose("tol", tol, 1e-8), note=note)
+    try:
+        return _finish(states, out, method, backends, options, accuracy, quantity, start)
+    except InputError as error:
+        raise error if file is None else file.located(error) from error
+
+
+def _finish(
+    states: tuple[Scene, ...],
+    out: str | Path | None,
+    method: str,
+    backends: tuple[str, str],
+    options: Options,
+    accuracy: float | None,
+    quantity: str | None,
+    start: float,
+) -> Result:
+    """Solve the states, and write figures and files; `start` is when the clock began."""
     if out is not None:
         check_folder(Path(out))
     solved, path, estimate = _solve(states, accuracy, quantity, options)
@@ -129,7 +162,7 @@ def run(
     )
     if out is None:
         return replace(made, summary=summary | _seconds(seconds, start))
-    note("drawing figures, writing files")
+    options.note("drawing figures, writing files")
     with whole_folder(out, _earlier_files(Path(out))) as folder:
         with _clock(seconds, "figures"):
             _draw(made, folder)
@@ -140,7 +173,7 @@ def run(
     return made
 
 
-def _states(scene: str | Scene, changes: dict[str, Any]) -> tuple[Scene, ...]:
+def _states(scene: Any, changes: dict[str, Any]) -> tuple[Scene, ...]:
     """The scene, or the states of its load path."""
     if isinstance(scene, str):
         return make_path(scene, **changes) if scene in PATHS else (make_scene(scene, **changes),)

@@ -1,7 +1,7 @@
 """The chosen numbers of this room, all of them, and the commands that show what they are worth.
 
-`python -m experiments.accuracy` measures readings and error estimates against exact solutions, `python -m
-experiments.cost_ratio` what the start from a coarse mesh saves.
+`python -m experiments.questions.accuracy` measures readings and error estimates against exact solutions.
+`python -m experiments.questions.cost_ratio` measures what the start from a coarse mesh saves.
 """
 
 # Reading edges and peaks (contactopt.analysis.edges, contactopt.analysis.quantities).
@@ -23,6 +23,6 @@ ROUGH = 1e-6  # certificate asked of a coarse mesh: its own error is larger
 # Refinement (contactopt.analysis.accuracy).
 FIRST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least, by dimension
 BELOW = 8  # by how much fewer than the scene's default they are
-LARGEST = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about a gigabyte and half a minute
+MOST_UNKNOWNS = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about a gigabyte and half a minute
 SLOWEST = 0.75  # least order that is believed: slower ones were noise wherever the exact value was known
 STUCK = 0.1  # order below which a sequence does not converge

@@ -139,10 +139,22 @@ def follow(
 ) -> PathResult:
     """Solve a load path: the states of one scene in their order, from the unloaded bodies on.
 
-    scenes    that differ in their loads only: forces, tractions, prescribed displacements
-    elements, zone, Q, solver   as for reduce_bodies(): one mesh for the whole path, fine enough for all of its zones
-    settings  go to solve(), where each step starts from the solution of the one before
-    Raises InputError for an empty path or states that are not those of one scene.
+    Parameters
+    ----------
+    scenes : states that differ in their loads only: forces, tractions, prescribed displacements
+    elements : across the contact half-width; the scene's own number by default. One mesh serves the whole path.
+    zone : half-width that the mesh resolves [length]; by default the scene's
+    note : receives one short sentence before every step that takes time
+    Q, solver : form of Q and solver of the bodies, as for reduce()
+    settings : arguments of solve(). Each step starts from the solution of the one before.
+
+    Returns
+    -------
+    PathResult : the states with their solutions, in their order
+
+    Raises
+    ------
+    InputError : for an empty path, or for states that are not those of one scene
     """
     states: list[State] = []
     seconds: Counter[str] = Counter()

@@ -108,6 +108,20 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
     return planes
 
 
+def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
+    """The normals (dim, k); at planes of symmetry they lie in the plane.
+
+    The mean over the facets that are modelled leaves out their mirror images, and so is tilted on a curved surface.
+    """
+    normals = contacts.normals
+    for plane in symmetry_planes(contacts):
+        straight = normals - plane.inward[:, None] * (plane.inward @ normals)
+        straight = straight / np.linalg.norm(straight, axis=0).clip(NEAR)
+        tilted = plane.contains(contacts.points, contacts.size) & (np.abs(plane.inward @ normals) > NEAR)
+        normals = np.where(tilted, straight, normals)
+    return normals
+
+
 def _line(
     contacts: ContactPoints, tangents: np.ndarray, planes: list[SymmetryPlane], mirrors: bool
 ) -> tuple[np.ndarray, tuple[bool, ...], float | None]:

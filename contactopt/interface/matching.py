@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from contactopt.bodies.protocol import AssembledBody, Surface
 from contactopt.errors import InputError
-from contactopt.interface.charts import ContactPoints, lay_out, symmetry_planes
+from contactopt.interface.charts import ContactPoints, lay_out, normals_in_planes, symmetry_planes
 from contactopt.interface.coupling import Coupling, local_map, renumbered
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
@@ -24,6 +24,20 @@ def couple_nodes(scene: Scene, pair: Contact, upper: AssembledBody, lower: Assem
 
     Frames and areas are those of the body that the contacts belong to. The contacts are numbered along the chart.
 
+    Parameters
+    ----------
+    scene
+        The kind of the scene and its law.
+    pair
+        The pair of surfaces.
+    upper, lower
+        The two bodies, of which at least one has a mesh.
+
+    Returns
+    -------
+    Coupling
+        One contact for each pair of nodes.
+
     Raises
     ------
     InputError
@@ -32,7 +46,11 @@ def couple_nodes(scene: Scene, pair: Contact, upper: AssembledBody, lower: Assem
     names = pair.surfaces
     if upper.meshed and lower.meshed:
         first, second = upper.surface(names[0]), lower.surface(names[1])
-        partner, normals = match(first, second), second.normals
+        partner = match(first, second)
+        held = first.held[:, partner] & second.held
+        normals = normals_in_planes(
+            ContactPoints(second.points, second.normals, second.areas, second.cells, held, 0 * second.areas)
+        )
         apart = (first.weights @ first.places.T)[partner] - second.weights @ second.places.T
         gap = np.sum(normals * apart.T, axis=0)
         lead = second

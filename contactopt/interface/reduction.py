@@ -26,7 +26,7 @@ from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
 from contactopt.bodies.protocol import AssembledBody, Body, Product
 from contactopt.errors import InputError
-from contactopt.interface.costs import LARGEST, form_of
+from contactopt.interface.costs import MOST_EXPLICIT, form_of
 from contactopt.interface.coupling import Coupling, couple
 from contactopt.problem import InterfaceProblem, Law, Pair
 from contactopt.problem.laws import make_law
@@ -142,6 +142,11 @@ def reduce(
         'auto' or a name in contactopt.interface.coupling.COUPLINGS for all pairs of surfaces; by default each has its own,
         which is 'auto' unless its Contact says otherwise: matching nodes where they match, mortar where they do not.
 
+    Returns
+    -------
+    InterfaceProblem
+        Its compliance, gaps, motions and resultants, with the law of the scene.
+
     Raises
     ------
     InputError
@@ -158,9 +163,24 @@ def reduce_bodies(
     solver: str = "auto",
     coupling: str | None = None,
 ) -> Reduction:
-    """As reduce(), keeping the bodies for recovery.
+    """Reduce a scene to its interface problem and keep the bodies, from which fields are recovered.
 
-    The bodies are made solvable at the same time.
+    Where the solvers of the bodies allow it, the bodies are factorised at the same time.
+
+    Parameters
+    ----------
+    scene, elements, zone, Q, solver, coupling
+        As for reduce().
+
+    Returns
+    -------
+    Reduction
+        The interface problem with the bodies, the coupling and the seconds that each phase took.
+
+    Raises
+    ------
+    InputError
+        As reduce().
     """
     if Q not in FORMS:
         raise InputError(f"unknown form of Q {Q!r}; choose from {', '.join(FORMS)}.")
@@ -179,8 +199,8 @@ def reduce_bodies(
     n = maps[0].shape[0]
     if Q == "auto":
         contact, largest = (max(getattr(b, size) for b in assembled) for size in ("interface_unknowns", "unknowns"))
-        if _filling(maps) ** 0.5 > LARGEST:
-            contact = LARGEST + 1
+        if _filling(maps) ** 0.5 > MOST_EXPLICIT:
+            contact = MOST_EXPLICIT + 1
         Q = form_of(contact, largest, scene.dim, any(b.iterates(solver) for b in assembled))
     log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, n)
     if Q == "explicit":

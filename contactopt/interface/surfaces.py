@@ -24,6 +24,20 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
 
     The contacts are carried by the side that the pair names, otherwise by that with more contacts where they face each other.
 
+    Parameters
+    ----------
+    scene
+        The kind of the scene and its law.
+    pair
+        The pair of surfaces.
+    upper, lower
+        The two bodies, both with a mesh.
+
+    Returns
+    -------
+    Coupling
+        One contact for each node of that body that faces the other one.
+
     Raises
     ------
     InputError

@@ -23,6 +23,16 @@ def transfer(source: InterfaceProblem, solution: Solution, target: InterfaceProb
     origin: along the polygon of the source's contacts in 2D, in the plane in which they extend most in 3D. Outside of the
     source's contacts the nearest one counts. The multipliers are taken over.
 
+    Parameters
+    ----------
+    source : a problem that was solved
+    solution : its solution
+    target : the problem to start, usually the same bodies on another mesh
+
+    Returns
+    -------
+    Solution : reactions and multipliers for the argument `start` of solve(), not certified
+
     Raises
     ------
     InputError : if the problems differ in dimension, in the number of coordinates or in that of plates

@@ -49,17 +49,31 @@ def solve(
 ) -> Solution:
     """Solve an interface problem; the answer's status is `solved` only if its certificate is at most `tol`.
 
-    method          a name (see `contactopt list`) with its `settings`, or a method object; None: `auto`, or `alternating`
-                    if the settings name a backend
-    tol             bound on natural_map_residual(problem, reactions, multipliers)
-    max_iterations, time_limit [s]   of the method, residual evaluation not counted
-    change_tol      the paper's criterion |r_t - r_t previous| / |r_t| <= change_tol (1e-5 there), None: not used. If
-                    it is met first the iteration ends, with status `settled` unless the certificate agrees
-    start           a solution of a problem of the same size, to start from instead of cold
-    progress        called with (iteration, residual) after each outer iteration
-    Raises InputError on arguments that make no sense, an unknown or missing backend, a method that does not solve the
-    problem's law, or a load that pulls the bodies apart. A problem that has no solution ends `infeasible`, with a proof,
-    where one is found. A backend that fails while solving is a status, with the last iterate.
+    A problem that has no solution ends `infeasible`, with a proof, where one is found. A backend that fails while solving
+    gives a status, too, with the last iterate.
+
+    Parameters
+    ----------
+    problem : what to solve
+    method : a name (see `contactopt list`) with its `settings`, or a method object; None: `auto`, or `alternating` if the
+        settings name a backend
+    tol : bound on natural_map_residual(problem, reactions, multipliers) [-]
+    max_iterations : of the method
+    time_limit : of the method [s]; the time of the certificate is not counted
+    change_tol : bound of the paper's criterion |r_t - r_t previous| / |r_t| (1e-5 there); None: not used. If it is met
+        first, the iteration ends with status `settled` unless the certificate agrees
+    start : a solution of a problem of the same size, to start from instead of cold
+    progress : called with (iteration, residual) after each outer iteration
+    settings : of a method that is given by its name
+
+    Returns
+    -------
+    Solution : reactions (k, dim) [force], multipliers (p,) [length], status, certificate and history
+
+    Raises
+    ------
+    InputError : on arguments that make no sense, an unknown or missing backend, a method that does not solve the problem's
+        law, or a load that pulls the bodies apart
     """
     check_number("tol", tol, low=0.0)
     check_number("max_iterations", max_iterations, low=0.0)
