@@ -46,7 +46,7 @@ with an elastic punch 1e7 times as stiff, whose mesh does not match:
 
 {rigid_punch}
 
-Cattaneo and Mindlin: cylinders pressed, then sheared in one step; root mean squares over the five shears, whose own errors
+Cattaneo and Mindlin: cylinders pressed, then sheared in one step; root mean squares over three shears, whose own errors
 follow. The meshes have nodes at the edges of stick and contact, which matching nodes turn to account: both bodies have
 the same kinks there. Where they do not match, linear elements do better with the contacts on the coarser side for the traction,
 on the finer side for the pressure; quadratic ones have no such choice to make:
@@ -72,7 +72,7 @@ threads:
 
 The elastic punch with 48:32 linear elements, E = 5e5, in CalculiX on the same meshes: mortar contact (hard), and
 surface-to-surface penalty (1e3 E / h). Differences are of nodal forces from contactopt's, in L2, relative, on the contact
-nodes of each body; times are medians of {repeats} runs, for contactopt with meshes and assembly, for ccx as it states them.
+nodes of each body; times are those of one run, for contactopt with meshes and assembly, for ccx as it states them.
 
 {beside}
 """

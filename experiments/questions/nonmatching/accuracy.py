@@ -17,7 +17,7 @@ from experiments.questions.nonmatching.bodies import apart, carried, press_fit, 
 METHODS = ("newton", "auto")
 FINE = 192
 SIZES = ((16, 16), (24, 24), (16, 24), (24, 16), (32, 32), (48, 48), (32, 48))
-SHEARS = (10.0, 20.0, 30.0, 40.0, 45.0)
+SHEARS = (10.0, 30.0, 45.0)
 
 
 def hertz() -> list[dict[str, Any]]:
