@@ -9,12 +9,15 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
 from contactopt.solving.kernels.bonded import Bonded
 from contactopt.solving.kernels.krylov import krylov_step, model_of
 from contactopt.solving.kernels.semismooth import RIDGE, Equations
+from contactopt.solving.kernels.sparse_blocks import block_matrix
+from contactopt.solving.kernels.sparse_newton import ProximalEquations
 
 FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-4  # accuracy of an iterative step: the first, and the bounds of the others
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
@@ -75,6 +78,21 @@ def dense(problem: InterfaceProblem) -> tuple[Step, Step]:
     return steps(RIDGE), steps(GLUE)
 
 
+def sparse(problem: InterfaceProblem) -> tuple[Step, Step]:
+    """Newton's steps on a sparse Q, and those of the bonded solution."""
+    matrix = block_matrix(problem.Q, problem.dim)
+    system = ProximalEquations(matrix, problem.q, problem.V, problem.s, problem.law.project, np.ones(problem.contacts))
+
+    def steps(ridge: float) -> Step:
+        def step(equations, error, balance, D, rtol):  # type: ignore[no-untyped-def]
+            system.weight, system.rho = ridge, equations.rho
+            return system.step(error, balance, D)
+
+        return step
+
+    return steps(RIDGE), steps(GLUE)
+
+
 def newton_step(
     equations: Equations,
     factor: Bonded | None,
@@ -106,7 +124,8 @@ def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
     D = np.where(glued[:, None, None], np.eye(problem.dim), 0.0)
     glue = Equations(problem.Q, problem.q, problem.V, problem.s, lambda y: (np.where(glued[:, None], y, 0.0), D))
     _, error, balance, D = glue.evaluate(*zero)
-    bonded = (step or dense(problem)[1])(glue, error, balance, D, FIRST)
+    step = step or (sparse if sp.issparse(problem.Q) else dense)(problem)[1]
+    bonded = step(glue, error, balance, D, FIRST)
     if bonded is None or len(problem.s):
         return bonded or zero
     equations = coulomb_equations(problem)

@@ -18,11 +18,20 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import InterfaceOperator, loosened
-from contactopt.solving.kernels.alart_curnier import FIRST, cold_start, coulomb_equations, dense, forcing, krylov
+from contactopt.solving.kernels.alart_curnier import (
+    FIRST,
+    cold_start,
+    coulomb_equations,
+    dense,
+    forcing,
+    krylov,
+    sparse,
+)
 from contactopt.solving.methods import NATIVE, Iterate
 from contactopt.solving.notes import note
 from contactopt.solving.preconditioners import find_preconditioner
@@ -42,7 +51,8 @@ class Newton:
     linear: str | None = None
     preconditioner: str | None = None
     implicit: ClassVar[bool] = True  # takes an operator for Q
-    unsymmetric: ClassVar[bool] = True  # and one that is not symmetric
+    sparse: ClassVar[bool] = True  # or a sparse Q
+    unsymmetric: ClassVar[bool] = True  # or one that is not symmetric
 
     def __post_init__(self) -> None:
         if self.linear not in (None, "dense", "krylov"):
@@ -59,10 +69,14 @@ class Newton:
     def steps(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[tuple[Iterate, float]]:
         """Iterates with the residual of the equations that each step began with."""
         implicit = self.linear == "krylov" or (self.linear is None and isinstance(problem.Q, InterfaceOperator))
-        if not implicit:
+        by_blocks = self.linear is None and sp.issparse(problem.Q)
+        if not (implicit or by_blocks):
             problem = problem.explicit()
         equations = coulomb_equations(problem)
-        step, first = krylov(problem, self.preconditioner) if implicit else dense(problem)
+        if implicit:
+            step, first = krylov(problem, self.preconditioner)
+        else:
+            step, first = sparse(problem) if by_blocks else dense(problem)
         r, multipliers = cold_start(problem, first) if start is None else start
         last, rtol = np.inf, FIRST
         while True:
