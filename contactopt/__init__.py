@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual, siconos_residual
     from contactopt.problem.transfer import transfer
     from contactopt.runner import Result, run
+    from contactopt.scenes.contact import Contact
+    from contactopt.scenes.mesh_files import load_mesh
     from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
     from contactopt.solving.driver import solve
 
@@ -42,6 +44,8 @@ _HOMES = {
     "problem.transfer": ("transfer",),
     "runner": ("Result", "run"),
     "material": ("Material",),
+    "scenes.contact": ("Contact",),
+    "scenes.mesh_files": ("load_mesh",),
     "scenes.scene": ("BodyForce", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
     "solving.driver": ("solve",),
 }

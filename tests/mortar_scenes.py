@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 from unittest.mock import patch
 
@@ -43,12 +43,12 @@ class Coupled:
         return [(T.T @ reactions.ravel())[b.body.unknowns] for T, b in zip(maps, self.bodies)]
 
 
-def upper_carries(scene: Any, upper: Any, lower: Any) -> Coupling:
-    return couple_surfaces(scene, upper, lower, "upper")
+def upper_carries(scene: Any, pair: Any, upper: Any, lower: Any) -> Coupling:
+    return couple_surfaces(scene, replace(pair, carrier="upper"), upper, lower)
 
 
-def lower_carries(scene: Any, upper: Any, lower: Any) -> Coupling:
-    return couple_surfaces(scene, upper, lower, "lower")
+def lower_carries(scene: Any, pair: Any, upper: Any, lower: Any) -> Coupling:
+    return couple_surfaces(scene, replace(pair, carrier="lower"), upper, lower)
 
 
 def couple(scene: Any, own: str | None = None, elements: int | None = None, zone: float | None = None) -> Coupled:

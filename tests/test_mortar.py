@@ -407,7 +407,9 @@ def test_a_half_model_is_half_of_the_whole():
             hold = (Support("axis", {"x": 0.0}),) if copies == 2 else ()
             loads = (Plate("top", {"y": -1.0}),) if load else ()
             hold = hold if load else (*hold, Support("bottom"))
-            parts.append(Part("b", mesh, MATERIAL, hold, loads, contact="bottom" if load else "top"))
+            parts.append(
+                Part("upper" if load else "lower", mesh, MATERIAL, hold, loads, contact="bottom" if load else "top")
+            )
         coupled = couple(Scene("s", *parts, 0.2, degree=2, copies=copies))
         problem, solution = coupled.problem, solve(coupled.problem, tol=1e-12)
         x = problem.coordinates[0]

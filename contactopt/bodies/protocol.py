@@ -128,7 +128,7 @@ class Body(Protocol):
     name        its name in the scene
     unknowns    number of its free displacement unknowns, for tables
     at_rest     (n,) displacement at F = 0, lambda = 0 [length]
-    motions     (n, p) free motions
+    motions     (n, p) free motions, and motion_names, what each of them is, for messages
     resultants  (p,) work of the loads in the free motions [force]
     iterative   whether products cost iterations, so that a lower accuracy makes them cheaper
     complete    whether the entries of the compliance are cheap
@@ -146,6 +146,9 @@ class Body(Protocol):
 
     @property
     def motions(self) -> np.ndarray: ...
+
+    @property
+    def motion_names(self) -> tuple[str, ...]: ...
 
     @property
     def resultants(self) -> np.ndarray: ...
@@ -176,6 +179,12 @@ class Body(Protocol):
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
         """Forces (n,) of loads, supports and plates on the body in equilibrium at the displacement U (n,)."""
+
+    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """For each support and plate its positions (dim, m) and the forces (dim, m) with which it acts on the body there.
+
+        U (n,) is the displacement under the contact forces `force` (n,).
+        """
 
     def fields(self, U: np.ndarray) -> Fields | None:
         """Displacement and stress at the displacement U (n,); None for a body without any."""

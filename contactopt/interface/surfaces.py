@@ -7,33 +7,50 @@ import scipy.sparse as sp
 
 from contactopt.bodies.protocol import AssembledBody, Mesh, Surface
 from contactopt.errors import InputError
-from contactopt.interface.charts import ContactPoints, lay_out
-from contactopt.interface.coupling import Coupling
+from contactopt.interface.charts import ContactPoints, lay_out, symmetry_planes
+from contactopt.interface.coupling import Coupling, renumbered
 from contactopt.interface.faces import Faces, faces_of
 from contactopt.interface.mortar import Mortar, mortar
+from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
 
-def couple_surfaces(scene: Scene, upper: AssembledBody, lower: AssembledBody, own: str | None = None) -> Coupling:
+def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody) -> Coupling:
     """The mortar coupling of two bodies with meshes (contactopt.interface.mortar), numbered along the chart.
 
-    own  'upper' or 'lower': the body that carries the contacts; None: the one with more contacts where they face each other
+    The contacts are carried by the side that the pair names, otherwise by that with more contacts where they face each other.
+
+    Parameters
+    ----------
+    scene
+        The kind of the scene and its law.
+    pair
+        The pair of surfaces.
+    upper, lower
+        The two bodies, both with a mesh.
+
+    Returns
+    -------
+    Coupling
+        One contact for each node of that body that faces the other one.
 
     Raises
     ------
     InputError
         If a body has no mesh on its contact surface, or if the surfaces face each other nowhere.
     """
-    meshes = [_mesh(body.surface()) for body in (upper, lower)]
-    sides = [_faces(body.surface().body, mesh) for body, mesh in zip((upper, lower), meshes)]
-    m = mortar(sides[0], sides[1], own)
+    meshes = [_mesh(body.surface(name)) for body, name in zip((upper, lower), pair.surfaces)]
+    sides = [_faces(body.name, mesh) for body, mesh in zip((upper, lower), meshes)]
+    m = mortar(sides[0], sides[1], pair.carrier)
     mine, theirs = meshes[m.own], meshes[1 - m.own]
     held = mine.held[mine.unknowns[:, m.nodes]]
     still = np.stack([m.alone[1 - m.own] @ ~theirs.held[row] == 0 for row in theirs.unknowns])
-    contacts = ContactPoints(m.points, m.normals, m.areas, _cells(sides[m.own], m.nodes), held & still, m.gap)
+    cells = _cells(sides[m.own], m.nodes)
+    contacts = ContactPoints(m.points, m.normals, m.areas, cells, held & still, m.gap)
     chart, frames, order = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
     maps = [_map(m, i, mesh, held, frames, order) for i, mesh in enumerate(meshes)]
-    return Coupling(maps[0], maps[1], frames, m.gap[order], m.areas[order], m.points[:, order], chart)
+    areas, places, planes = m.areas[order], m.points[:, order], tuple(symmetry_planes(contacts))
+    return Coupling(maps[0], maps[1], frames, m.gap[order], areas, places, chart, renumbered(cells, order), planes)
 
 
 def _mesh(surface: Surface) -> Mesh:

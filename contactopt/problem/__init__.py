@@ -8,6 +8,7 @@ from contactopt.problem.chart import Chart
 from contactopt.problem.feasibility import Infeasible, infeasibility
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.laws import LAWS, Law
+from contactopt.problem.pairs import Pair, alone, part_of
 from contactopt.problem.scaling import Scales, dimensionless
 from contactopt.problem.solution import Solution, Status
 
@@ -17,13 +18,16 @@ __all__ = [
     "Infeasible",
     "InterfaceProblem",
     "Law",
+    "Pair",
     "Scales",
     "Solution",
     "Status",
+    "alone",
     "balance_residual",
     "dimensionless",
     "fit_multipliers",
     "infeasibility",
     "natural_map_residual",
+    "part_of",
     "siconos_residual",
 ]

@@ -171,7 +171,17 @@ def siconos_residual(problem: InterfaceProblem, reactions: np.ndarray, multiplie
 
     With K the product of the friction cones it is |r - proj_K(r - (u + mu |u_t| n))| / max(|q|, |r|, |u|), where
     |.| is the norm of all components together. It depends on units, and forces that move nothing or one distant open
-    contact make it as small as one likes. Parameters as in `natural_map_residual`; the balance of a plate is not in it.
+    contact make it as small as one likes. The balance of a plate is not in it.
+
+    Parameters
+    ----------
+    problem : the interface problem
+    reactions : (k, dim) forces, normal first [force]
+    multipliers : (p,) displacements of the plates [length]; None: those that fit best (`fit_multipliers`)
+
+    Returns
+    -------
+    The residual [-], 0 at a solution.
 
     Source: Acary, Bremond, Huber (2018), On solving contact problems with Coulomb friction: formulations and
     numerical comparisons; De Saxce, Feng (1998) for the map.

@@ -72,7 +72,8 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasi
         if verified(scaled, still, *ray):
             weights, motions = ray
             margin = -float(scaled.q[:, 0] @ weights + scaled.s @ motions) * scales.force * scales.length
-            return Infeasible(weights, motions * scales.multipliers / scales.length, margin, _sentence(scaled, weights))
+            told = _sentence(scaled, weights, motions)
+            return Infeasible(weights, motions * scales.multipliers / scales.length, margin, told)
         ray = _polished(scaled, still, *ray)
     log.info("a ray that would prove the problem infeasible did not stand the check")
     return None
@@ -175,11 +176,12 @@ def _polished(
     return new, x[used.sum() :]
 
 
-def _sentence(problem: InterfaceProblem, weights: np.ndarray) -> str:
+def _sentence(problem: InterfaceProblem, weights: np.ndarray, motions: np.ndarray) -> str:
     largest = float(weights.max(initial=0.0))
     contacts: list[int] = np.flatnonzero(weights > 1e-6 * largest).tolist() if largest > 0 else []
     if len(contacts) == 0:
-        return "no forces of the contacts can balance the load on the plate, so there is no solution; change the load."
+        what = problem.motions[int(np.argmax(np.abs(problem.s * motions)))] if problem.motions else "the plate"
+        return f"no forces of the contacts can balance the load on {what}, so there is no solution; change the load."
     listed = ", ".join(map(str, contacts[:8])) + (", ..." if len(contacts) > 8 else "")
     if np.any(problem.s):
         return (

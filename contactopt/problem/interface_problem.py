@@ -7,8 +7,8 @@
 
 One block per contact node, normal component first. r is the force on the upper body, r_n >= 0 in compression;
 u is the relative displacement plus the initial gap, so that u_n is the gap that remains. In the paper's letters
-R_n = -r_n and w_n - d = -u_n. V holds the rigid motions of bodies that are held only by a plate under a total force:
-lambda is the plate's displacement, s collects minus what r must balance.
+R_n = -r_n and w_n - d = -u_n. V holds the rigid motions that nothing but contact resists, of plates under a total force
+and of bodies without enough supports: lambda is how far each of them goes, s collects minus what r must balance.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from contactopt.problem.chart import Chart
 from contactopt.problem.laws import Law
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.operators import Interface, InterfaceOperator, asymmetry, dense, diagonal, row_sizes, sparse
+from contactopt.problem.pairs import Pair
 
 SYMMETRIC = 1e-2  # largest |Q - Q'|, over the largest |Q|, that counts as rounding of the code that wrote Q
 
@@ -47,10 +48,13 @@ class InterfaceProblem:
     q            (k, dim) displacement at r = 0, lambda = 0 [length]; q_n holds the initial gap
     law          a Law of contactopt.problem.laws, or friction coefficients, one number or (k,), which mean Coulomb's law;
                  the keyword `mu` may be given in its place
-    V, s         (k dim, p) rigid motions and (p,) resultants [force]; p = 0 without a plate
+    V, s         (k dim, p) rigid motions and (p,) resultants [force]; p = 0 where all bodies are held
     areas        (k,) nodal areas, force / area = traction; ones by default
     coordinates  (d, k) positions of the nodes in space, for output only; 0, 1, 2, ... by default
-    chart        the nodes' places on the contact surface; by default read from the coordinates (Chart.of_points)
+    chart        the nodes' places on the contact surface; by default read from the coordinates (Chart.of_points). With
+                 several pairs of surfaces each of them has its own chart, and this one is only an overview
+    pairs        the pairs of surfaces, as consecutive contacts 0 ... k - 1; by default one
+    motions      (p,) what each column of V is, for messages; may be left out
     Raises InputError on wrong shapes, numbers that are not finite or not real, negative mu, V without s, or a Q with a
     negative diagonal (an indefinite Q is not looked for: its answers are certified like any other; an operator is taken at
     its word).
@@ -64,6 +68,8 @@ class InterfaceProblem:
     areas: np.ndarray
     coordinates: np.ndarray
     chart: Chart
+    pairs: tuple[Pair, ...]
+    motions: tuple[str, ...]
 
     def __init__(
         self,
@@ -75,13 +81,17 @@ class InterfaceProblem:
         areas: Any = (),
         coordinates: Any = (),
         chart: Chart | None = None,
+        pairs: tuple[Pair, ...] = (),
+        motions: tuple[str, ...] = (),
         *,
         mu: Any = None,
     ):
         if (law is None) == (mu is None):
             raise InputError("give either a law or a friction coefficient mu.")
         given = {"Q": Q, "q": q, "law": mu if law is None else law, "V": V, "s": s, "areas": areas}
-        for name, value in (given | {"coordinates": coordinates, "chart": chart}).items():
+        for name, value in (
+            given | {"coordinates": coordinates, "chart": chart, "pairs": pairs, "motions": motions}
+        ).items():
             object.__setattr__(self, name, value)
         self._check()
 
@@ -116,6 +126,14 @@ class InterfaceProblem:
             object.__setattr__(self, "chart", Chart.of_points(self.coordinates, dim))
         elif self.chart.places.shape != (dim - 1, k):
             raise InputError(f"the chart must have places of shape {(dim - 1, k)}; got {self.chart.places.shape}.")
+        pairs = self.pairs
+        if len(pairs) < 2:  # the only pair is all of the problem, whatever was replaced in it
+            pairs = (Pair(pairs[0].name if pairs else "contact", 0, k, self.chart),)
+        if [pair.first for pair in pairs] + [k] != [0] + [pair.last for pair in pairs]:
+            raise InputError(f"the pairs of surfaces must follow each other from contact 0 to contact {k - 1}.")
+        object.__setattr__(self, "pairs", pairs)
+        if self.motions and len(self.motions) != len(self.s):
+            raise InputError(f"motions must name the {len(self.s)} columns of V; got {len(self.motions)} names.")
         if isinstance(self.Q, InterfaceOperator):
             return
         if diagonal(self.Q).min(initial=0.0) < -1e-12 * row_sizes(self.Q).max(initial=0.0):

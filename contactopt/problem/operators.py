@@ -8,7 +8,7 @@ and an InterfaceOperator.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -236,12 +236,20 @@ def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
     return np.sqrt(square / np.mean(square))
 
 
-def estimate_diagonal(product: Product, weights: np.ndarray, moves: np.ndarray) -> np.ndarray:
-    """diag(Q) (k dim,) from one product: its trace (Hutchinson 1989), shared out by nodal_weights (k,).
+def estimate_diagonal(product: Product, weights: Sequence[np.ndarray], moves: np.ndarray) -> np.ndarray:
+    """diag(Q) (k dim,) from one product: its trace (Hutchinson 1989) on each pair of surfaces, shared out by weights.
 
-    moves  (k dim,) mask of the components that can move; the diagonal is 0 elsewhere
+    weights  (k_i,) nodal_weights of each pair, one pair after the other
+    moves    (k dim,) mask of the components that can move; the diagonal is 0 elsewhere
     """
     signs = np.where(np.random.default_rng(0).random(len(moves)) < 0.5, -1.0, 1.0) * moves
-    trace = float(signs @ product(signs[:, None], 1e-2)[:, 0])
-    shares = np.repeat(weights**-2, len(moves) // len(weights)) * moves
-    return shares * (trace / shares.sum()) if shares.any() else shares
+    moved = product(signs[:, None], 1e-2)[:, 0]
+    dim = len(moves) // max(sum(len(own) for own in weights), 1)
+    diagonal, first = np.zeros(len(moves)), 0
+    for own in weights:
+        rows = slice(first, first + dim * len(own))
+        shares = np.repeat(own**-2, dim) * moves[rows]
+        if shares.any():
+            diagonal[rows] = shares * (float(signs[rows] @ moved[rows]) / shares.sum())
+        first = rows.stop
+    return diagonal

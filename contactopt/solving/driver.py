@@ -21,6 +21,7 @@ from contactopt.problem import (
     infeasibility,
     natural_map_residual,
 )
+from contactopt.problem.balance import escape, sentence
 from contactopt.problem.operators import InterfaceOperator, loosened
 from contactopt.solving.deadline import TimeUp, until
 from contactopt.solving.methods import Iterate, Method, default_method, find_method, solvers_of, solves
@@ -48,18 +49,31 @@ def solve(
 ) -> Solution:
     """Solve an interface problem; the answer's status is `solved` only if its certificate is at most `tol`.
 
-    method          a name (see `contactopt list`) with its `settings`, or a method object; None: `auto`, or `alternating`
-                    if the settings name a backend
-    tol             bound on natural_map_residual(problem, reactions, multipliers)
-    max_iterations  of the method
-    time_limit      [s] from the call on; what cannot be interrupted, such as one factorisation, is waited for
-    change_tol      the paper's criterion |r_t - r_t previous| / |r_t| <= change_tol (1e-5 there), None: not used. If
-                    it is met first the iteration ends, with status `settled` unless the certificate agrees
-    start           a solution of a problem of the same size, to start from instead of cold
-    progress        called with (iteration, residual) after each outer iteration
-    Raises InputError on arguments that make no sense, an unknown or missing backend, a method that does not solve the
-    problem's law, or a load that pulls the bodies apart. A problem that has no solution ends `infeasible`, with a proof,
-    where one is found. A backend that fails while solving is a status, with the last iterate.
+    A problem that has no solution ends `infeasible`, with a proof, where one is found. A backend that fails while solving
+    gives a status, too, with the last iterate.
+
+    Parameters
+    ----------
+    problem : what to solve
+    method : a name (see `contactopt list`) with its `settings`, or a method object; None: `auto`, or `alternating` if the
+        settings name a backend
+    tol : bound on natural_map_residual(problem, reactions, multipliers) [-]
+    max_iterations : of the method
+    time_limit : from the call on [s]; what cannot be interrupted, such as one factorisation, is waited for
+    change_tol : bound of the paper's criterion |r_t - r_t previous| / |r_t| (1e-5 there); None: not used. If it is met
+        first, the iteration ends with status `settled` unless the certificate agrees
+    start : a solution of a problem of the same size, to start from instead of cold
+    progress : called with (iteration, residual) after each outer iteration
+    settings : of a method that is given by its name
+
+    Returns
+    -------
+    Solution : reactions (k, dim) [force], multipliers (p,) [length], status, certificate and history
+
+    Raises
+    ------
+    InputError : on arguments that make no sense, an unknown or missing backend, a method that does not solve the problem's
+        law, or a load that pulls the bodies apart
     """
     check_number("tol", tol, low=0.0)
     check_number("max_iterations", max_iterations, low=0.0)
@@ -246,7 +260,16 @@ def _relative(new: np.ndarray, old: np.ndarray) -> float:
 
 
 def _check_equilibrium(problem: InterfaceProblem) -> None:
-    """Contact only pushes: a plate that moves along the normals must be pressed on, not pulled off."""
+    """Contact only pushes: InputError for a load that it cannot balance.
+
+    Where the multipliers are known by name, the motion along which the bodies escape is looked for. Otherwise only a plate
+    that moves along the normals and is pulled off is refused.
+    """
+    if problem.motions:
+        found = escape(problem)
+        if found is not None:
+            raise InputError(sentence(problem, found))
+        return
     if not problem.law.unilateral:
         return
     V = problem.V.reshape(problem.contacts, problem.dim, -1)

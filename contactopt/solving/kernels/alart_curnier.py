@@ -10,14 +10,13 @@ from collections.abc import Callable
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
-from contactopt.solving.kernels.bonded import Bonded
+from contactopt.solving.kernels.bonded import SOFTEST, Bonded
 from contactopt.solving.kernels.krylov import krylov_step, model_of
 from contactopt.solving.kernels.semismooth import RIDGE, Equations
-from contactopt.solving.kernels.sparse_blocks import block_matrix
-from contactopt.solving.kernels.sparse_newton import ProximalEquations
 
 FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-4  # accuracy of an iterative step: the first, and the bounds of the others
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
@@ -50,6 +49,15 @@ def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = Non
     )
 
 
+def definite(Q: sp.csr_array) -> bool:
+    """Whether a sparse symmetric Q is safely positive definite, as that of elastic bodies without redundant contacts."""
+    try:
+        pivots = splu(sp.csc_array(Q), diag_pivot_thresh=0.0, options={"SymmetricMode": True}).U.diagonal()
+    except RuntimeError:
+        return False
+    return bool(pivots.min() > SOFTEST**2 * pivots.max())
+
+
 def bonded_factor(problem: InterfaceProblem) -> Bonded | None:
     """The factorised bonded system where it pays: elastic bodies pressed together by a plate, Q of full rank."""
     try:
@@ -79,18 +87,31 @@ def dense(problem: InterfaceProblem) -> tuple[Step, Step]:
 
 
 def sparse(problem: InterfaceProblem) -> tuple[Step, Step]:
-    """Newton's steps on a sparse Q, and those of the bonded solution."""
-    matrix = block_matrix(problem.Q, problem.dim)
-    system = ProximalEquations(matrix, problem.q, problem.V, problem.s, problem.law.project, np.ones(problem.contacts))
+    """Newton's steps by sparse factors, for many bodies of which each touches few others, and those of the bonded solution."""
+    V = sp.csr_array(problem.V)
 
     def steps(ridge: float) -> Step:
-        def step(equations, error, balance, D, rtol):  # type: ignore[no-untyped-def]
-            system.weight, system.rho = ridge, equations.rho
-            return system.step(error, balance, D)
-
-        return step
+        return lambda equations, error, balance, D, rtol: sparse_step(equations, V, error, balance, D, ridge)
 
     return steps(RIDGE), steps(GLUE)
+
+
+def sparse_step(
+    equations: Equations, V: sp.csr_array, error: np.ndarray, balance: np.ndarray, D: np.ndarray, ridge: float
+) -> Iterate | None:
+    """One step by the factors of [[I - D + D rho (Q + ridge I), D rho V], [V', 0]]; None if it is singular."""
+    k, d = error.shape
+    n, p = error.size, len(balance)
+    places = np.arange(k * d).reshape(k, d)
+    where = np.repeat(places, d, axis=1).ravel(), np.tile(places, (1, d)).ravel()
+    scaled = sp.csr_array(((equations.rho[:, None, None] * D).ravel(), where), (n, n))
+    rest = sp.csr_array(((np.eye(d) - D + ridge * equations.rho[:, None, None] * D).ravel(), where), (n, n))
+    matrix = sp.block_array([[scaled @ equations.Q + rest, scaled @ V], [V.T, sp.csr_array((p, p))]], format="csc")
+    try:
+        x = splu(matrix).solve(np.concatenate([error.ravel(), -balance]))
+    except RuntimeError:  # exactly singular
+        return None
+    return (x[:n].reshape(k, d), x[n:]) if np.all(np.isfinite(x)) else None
 
 
 def newton_step(
@@ -124,8 +145,8 @@ def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
     D = np.where(glued[:, None, None], np.eye(problem.dim), 0.0)
     glue = Equations(problem.Q, problem.q, problem.V, problem.s, lambda y: (np.where(glued[:, None], y, 0.0), D))
     _, error, balance, D = glue.evaluate(*zero)
-    step = step or (sparse if sp.issparse(problem.Q) else dense)(problem)[1]
-    bonded = step(glue, error, balance, D, FIRST)
+    make = sparse if sp.issparse(problem.Q) else dense
+    bonded = (step or make(problem)[1])(glue, error, balance, D, FIRST)
     if bonded is None or len(problem.s):
         return bonded or zero
     equations = coulomb_equations(problem)

@@ -1,6 +1,6 @@
 """The default, without a number to choose: Newton's method, and where it fails cones, then the proximal loop.
 
-1. Unless Q is sparse (rigid bodies): Newton's method from the bonded solution (or no force at all) while its residual
+1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no force at all) while its residual
    falls. Elastic bodies end here (reports/newton_steps), each step one dense linear system.
 2. The interior-point method (contactopt.solving.kernels.interior), which no cycle and no rank deficiency of Q disturbs,
    and a few steps of the proximal loop for the last digits. They need no symmetric Q and no backend.
@@ -28,7 +28,7 @@ import scipy.sparse as sp
 from contactopt.errors import BackendError, InputError
 from contactopt.problem import InterfaceProblem, infeasibility
 from contactopt.problem.operators import InterfaceOperator
-from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations
+from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations, definite
 from contactopt.solving.kernels.interior import interior_iterates
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.solving.methods import NATIVE, Iterate
@@ -69,13 +69,14 @@ class Auto:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        if sp.issparse(problem.Q):
+        if sp.issparse(problem.Q) and not (problem.symmetric and definite(problem.Q)):
             reached = start or (np.zeros(problem.q.shape), np.zeros(len(problem.s)))
         else:
             reached = yield from self._newton(problem, start, self.preconditioner)
             note(logger, "Newton's method made no progress, so interior points and the proximal loop take over")
             try:
-                problem = problem.explicit()  # all that follows looks at the entries of Q
+                if not sp.issparse(problem.Q):
+                    problem = problem.explicit()  # all that follows looks at the entries of Q
             except InputError as error:
                 note(logger, f"the default method ends with Newton's steps: {error}")
                 return

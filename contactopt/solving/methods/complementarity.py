@@ -26,7 +26,7 @@ from contactopt.problem.laws import Law
 from contactopt.solving.deadline import check_time
 from contactopt.solving.methods import NATIVE, Iterate
 
-LARGEST = 300  # contacts: the tableau has 2 (4 x 300)^2 entries
+MOST_CONTACTS = 300  # contacts: the tableau has 2 (4 x 300)^2 entries
 PIVOT, TIE = 1e-10, 1e-12  # least pivot; relative distance of equal ratios
 
 
@@ -45,8 +45,8 @@ class Lemke:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        if problem.dim != 2 or problem.contacts > LARGEST:
-            raise InputError(f"the method 'lemke' needs a 2D problem of at most {LARGEST} contacts; use 'auto'.")
+        if problem.dim != 2 or problem.contacts > MOST_CONTACTS:
+            raise InputError(f"the method 'lemke' needs a 2D problem of at most {MOST_CONTACTS} contacts; use 'auto'.")
         for copositive in (False, True):
             M, q, C = complementarity_problem(problem, copositive)
             z = lemke(M, q)
