@@ -156,6 +156,8 @@ def follow(
     ------
     InputError : for an empty path, or for states that are not those of one scene
     """
+    if not isinstance(scenes, Iterable) or (np.ndim(scenes) == 0 and isinstance(scenes, np.ndarray)):
+        raise InputError(f"a path is a list of scenes; got {type(scenes).__name__}.")
     states: list[State] = []
     seconds: Counter[str] = Counter()
     reduction: Reduction | None = None

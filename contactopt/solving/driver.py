@@ -191,8 +191,8 @@ def _dimensionless_start(start: Solution, problem: InterfaceProblem, scales: Sca
     multipliers = real_array("the start's array of multipliers", start.multipliers)
     if r.shape != problem.q.shape or multipliers.shape != problem.s.shape:
         raise InputError(
-            f"start has reactions {r.shape} and {len(multipliers)} multipliers; this problem needs "
-            f"{problem.q.shape} and {len(problem.s)}."
+            f"start has reactions {r.shape} and multipliers {multipliers.shape}; this problem needs "
+            f"{problem.q.shape} and {problem.s.shape}."
         )
     return scales.to_dimensionless(r, multipliers)
 

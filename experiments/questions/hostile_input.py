@@ -73,7 +73,9 @@ def solves(rng: np.random.Generator, folder: Path) -> None:
     problem = co.InterfaceProblem(**good(rng))
     settings: dict[str, Any] = dict(tol=10.0 ** rng.integers(-16, -3), time_limit=LIMIT, max_iterations=200)
     method: Any = any_of(rng, list(METHODS))
-    spoilt = any_of(rng, ["", "", "", "method", "tol", "time_limit", "max_iterations", "change_tol", "start", "relaxation"])
+    spoilt = any_of(
+        rng, ["", "", "", "method", "tol", "time_limit", "max_iterations", "change_tol", "start", "relaxation"]
+    )
     if spoilt == "method":
         method = any_of(rng, JUNK)
     elif spoilt:
@@ -120,7 +122,9 @@ def files(rng: np.random.Generator, folder: Path) -> None:
         with h5py.File(target, "w") as file:
             file["fclib_local"] = h5py.ExternalLink("sound.hdf5", "/fclib_local")
     else:
-        text = [str(any_of(rng, [2, 3, 1, 0, -1, 1e9, "nan", "x", "10000000000"])) for _ in range(int(rng.integers(0, 30)))]
+        text = [
+            str(any_of(rng, [2, 3, 1, 0, -1, 1e9, "nan", "x", "10000000000"])) for _ in range(int(rng.integers(0, 30)))
+        ]
         target.write_bytes(any_of(rng, [" ".join(text).encode(), rng.bytes(50), b"\x89HDF\r\n\x1a\n" + rng.bytes(50)]))
     co.fclib.read(target)
 
@@ -133,7 +137,7 @@ def scenes(rng: np.random.Generator, folder: Path) -> None:
         co.Material(any_of(rng, [1.0, *JUNK]), any_of(rng, [0.3, *JUNK]))
     elif kind in ("support", "traction", "body force"):
         maker = {"support": co.Support, "traction": co.Traction, "body force": co.BodyForce}[kind]
-        load = maker(*(any_of(rng, ["top", *JUNK]) for _ in range(int(rng.integers(0, 4)))))
+        load = maker(*(any_of(rng, ["top", *JUNK]) for _ in range(len(maker.__dataclass_fields__))))
         part = replace(scene.upper, **{any_of(rng, ["supports", "loads"]): (load,)})
         co.reduce(replace(scene, upper=part), elements=1)
     elif kind == "part":
@@ -156,7 +160,18 @@ def commands(rng: np.random.Generator, folder: Path) -> None:
     from contactopt.cli import main
 
     words = ["x", "-1", "0", "nan", "1e308", "1000000000", "", "../..", "--zz", "punch-2d", "é", "\x00", "inf"]
-    options = ["--mu", "--force", "--elements", "--tol", "--method", "--degree", "--q", "--solver", "--accuracy", "--quantity"]
+    options = [
+        "--mu",
+        "--force",
+        "--elements",
+        "--tol",
+        "--method",
+        "--degree",
+        "--q",
+        "--solver",
+        "--accuracy",
+        "--quantity",
+    ]
     command = any_of(rng, ["run", "run", "list", "benchmark", "report", "solve", "x", ""])
     line = [command, any_of(rng, ["punch-2d", *words])]
     line += [any_of(rng, options), any_of(rng, words)] if rng.random() < 0.8 else []
@@ -173,7 +188,11 @@ def judge(seed: int) -> tuple[str, str, str]:
     rng = np.random.default_rng(seed)
     door = DOORS[seed % len(DOORS)]
     silent = io.StringIO()
-    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(silent), contextlib.redirect_stderr(silent):
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        contextlib.redirect_stdout(silent),
+        contextlib.redirect_stderr(silent),
+    ):
         old = os.getcwd()
         os.chdir(folder)
         try:
