@@ -234,3 +234,11 @@ def test_energy_balance_with_quadratic_displacement():
     path = follow([replace(dragged(d), degree=2) for d in (0.0, 1.0, 0.5)])
     assert path.solved
     np.testing.assert_allclose(path.history["energy_error"], 0.0, atol=1e-9)
+
+
+def test_a_path_refuses_states_of_other_bodies():
+    scene = contactopt.scenes.flat_punch(dim=2)
+    for change in ({"material": contactopt.Material(7.0, 0.1)}, {"name": "other"}):
+        other = dataclasses.replace(scene, upper=dataclasses.replace(scene.upper, **change))
+        with pytest.raises(contactopt.InputError):
+            contactopt.follow([scene, other], elements=2)
