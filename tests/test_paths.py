@@ -237,8 +237,8 @@ def test_energy_balance_with_quadratic_displacement():
 
 
 def test_a_path_refuses_states_of_other_bodies():
-    scene = contactopt.scenes.flat_punch(dim=2)
-    for change in ({"material": contactopt.Material(7.0, 0.1)}, {"name": "other"}):
-        other = dataclasses.replace(scene, upper=dataclasses.replace(scene.upper, **change))
-        with pytest.raises(contactopt.InputError):
-            contactopt.follow([scene, other], elements=2)
+    scene = scenes.flat_punch(dim=2)
+    for change in ({"material": Material(7.0, 0.1)}, {"name": "other"}):
+        other = replace(scene, upper=replace(scene.upper, **change))
+        with pytest.raises(InputError):
+            follow([scene, other], elements=2)

@@ -18,6 +18,7 @@ import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,6 +26,7 @@ import scipy.sparse as sp
 from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
 from contactopt.bodies.protocol import AssembledBody, Body, Product
+from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
 from contactopt.interface.coupling import Coupling, couple
@@ -127,8 +129,15 @@ def _check_same(one: Scene, other: Scene) -> None:
             raise InputError(f"the states of a path must have the same bodies; '{a.name}' became '{b.name}'.")
         if isinstance(a, Part) and isinstance(b, Part) and a.material != b.material:
             raise InputError(f"body '{a.name}' changes its material along the path; only loads may change.")
-        if isinstance(a, Part) and isinstance(b, Part) and not callable(a.mesh) and a.mesh is not b.mesh:
+        if isinstance(a, Part) and isinstance(b, Part) and not _same_mesh(a.mesh, b.mesh):
             raise InputError(f"body '{a.name}' changes its mesh along the path; only loads may change.")
+
+
+def _same_mesh(one: Any, other: Any) -> bool:
+    """Whether two given meshes have the same nodes and elements; meshes that functions make are not compared."""
+    if callable(one) or callable(other):
+        return callable(one) and callable(other)
+    return one is other or (np.array_equal(one.p, other.p) and np.array_equal(one.t, other.t))
 
 
 def reduce(
@@ -198,6 +207,9 @@ def reduce_bodies(
         raise InputError(f"unknown form of Q {Q!r}; choose from {', '.join(FORMS)}.")
     elements = scene.elements if elements is None else elements
     zone = scene.zone if zone is None else zone
+    check_count("elements", elements)
+    if zone is not None:
+        check_number("the contact zone's half-width", zone, low=0.0)
     seconds: dict[str, float] = {}
     start = time.perf_counter()
     assembled = [assemble(scene, part, elements, zone) for part in scene.parts]

@@ -93,6 +93,8 @@ class Part:
         if not isinstance(self.material, Material):
             raise InputError(f"body '{self.name}': its material must be a Material(E, nu); got {self.material!r}.")
 
+        if not isinstance(self.contact, str):
+            raise InputError(f"body '{self.name}': its contact boundary must be a name; got {short(self.contact)}.")
         if self.curve is not None and not callable(self.curve) and not isinstance(self.curve, Mapping):
             raise InputError(
                 f"body '{self.name}': its curve must be a function, or a mapping from boundaries to functions."
@@ -173,6 +175,8 @@ class Scene:
     contacts: tuple[Contact, ...] = ()
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise InputError(f"the scene's name must be a text; got {short(self.name)}.")
         if not isinstance(self.kind, str) or self.kind not in COMPONENTS:
             raise InputError(f"scene '{self.name}': unknown kind {self.kind!r}; choose from {', '.join(COMPONENTS)}.")
         self._check_form()
@@ -305,7 +309,11 @@ class Scene:
         for load in part.loads:
             if isinstance(load, Plate):
                 self._check_components(part.name, load.force)
-            elif not isinstance(load.value, (tuple, list, np.ndarray)) or np.shape(load.value) != (self.dim,):
+            elif (
+                not isinstance(load.value, (tuple, list, np.ndarray))
+                or not np.iterable(load.value)
+                or len(load.value) != self.dim
+            ):
                 raise InputError(
                     f"body '{part.name}': a {type(load).__name__} needs {self.dim} values "
                     f"({', '.join(self.components)}); got {short(load.value)}."
