@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
     from contactopt.problem.transfer import transfer
     from contactopt.runner import Result, run
-    from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
+    from contactopt.scenes.scene import BodyForce, HalfSpace, Part, Plate, Rigid, Scene, Support, Traction
     from contactopt.solving.driver import solve
 
 # name -> the module that it stands in
@@ -42,7 +42,7 @@ _HOMES = {
     "problem.transfer": ("transfer",),
     "runner": ("Result", "run"),
     "material": ("Material",),
-    "scenes.scene": ("BodyForce", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
+    "scenes.scene": ("BodyForce", "HalfSpace", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
     "solving.driver": ("solve",),
 }
 _MODULES = {

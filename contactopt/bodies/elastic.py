@@ -101,6 +101,9 @@ class ElasticBody:
 
         return product
 
+    def convolution(self, T: sp.csr_matrix) -> None:
+        return None
+
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
         local, soft = T[:, self.interface], T @ self.soft
         C = local @ (local @ self.interface_compliance).T

@@ -1,7 +1,7 @@
 """A rigid body: its compliance is zero, and its displacement unknowns are its motions.
 
 It has one unknown for each component of a translation. Those with a total force are free motions, whose displacements are
-multipliers of the interface problem; the others are held at zero.
+multipliers of the interface problem; the others are given, by default zero.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ class RigidBody:
 
     @property
     def at_rest(self) -> np.ndarray:
-        return np.zeros(len(self.components))
+        values = self.part.displacement or {}
+        return np.array([float(values.get(name, 0.0)) for name in self.components])
 
     @property
     def motions(self) -> np.ndarray:
@@ -68,7 +69,8 @@ class RigidBody:
         """The initial gap at the contacts from that at the nodes, with the weights of the displacements."""
         if self.part.gap is None:
             return np.zeros(other.points.shape[1])
-        gap = np.asarray(self.part.gap(other.places), dtype=float)
+        given = self.part.gap(other.places) if callable(self.part.gap) else self.part.gap
+        gap = np.asarray(given, dtype=float).ravel()
         if gap.shape != other.places.shape[1:] or not np.all(np.isfinite(gap)):
             raise InputError(f"the gap of rigid body '{self.name}' must give one finite number per contact node.")
         return np.asarray(other.weights @ gap)
@@ -82,6 +84,9 @@ class RigidBody:
     def product(self, T: sp.csr_matrix) -> Product:
         return lambda X, accuracy: np.zeros(X.shape)
 
+    def convolution(self, T: sp.csr_matrix) -> None:
+        return None
+
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
         return np.zeros((T.shape[0], T.shape[0]))
 
@@ -89,13 +94,13 @@ class RigidBody:
         return np.zeros(T.shape[0], dtype=bool)
 
     def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        return np.asarray(self.motions @ multipliers)
+        return np.asarray(self.at_rest + self.motions @ multipliers)
 
     def energy(self, U: np.ndarray) -> float:
         return 0.0
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """The total forces. What holds the other components does no work and is left out."""
+        """The total forces. What holds or displaces the other components is left out: U does not tell it."""
         return np.asarray(self.motions @ self.resultants)
 
     def fields(self, U: np.ndarray) -> None:

@@ -27,6 +27,7 @@ from contactopt.errors import InputError
 from contactopt.interface.costs import form_of
 from contactopt.interface.coupling import Coupling, couple
 from contactopt.problem import InterfaceProblem
+from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import make_law
 from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, estimate_diagonal, nodal_weights
 from contactopt.scenes.scene import Scene
@@ -164,7 +165,11 @@ def reduce_bodies(
 
 
 def _operator(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], coupling: Coupling) -> InterfaceOperator:
-    """Q by its products. Its diagonal is an estimate, which takes one product."""
+    """Q by its products: a convolution where every body has one. Else its diagonal is an estimate, which takes one product."""
+    kernels = [body.convolution(B) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    if kernels and all(kernel is not None for kernel in kernels):
+        known = [kernel for kernel in kernels if kernel is not None]
+        return Convolution(sum(known[1:], known[0]))
     moved = [body.moved(B) for body, B in zip(bodies, maps)]
     terms = [(body.product(B), body.parallel) for body, B, moves in zip(bodies, maps, moved) if moves.any()]
     parallel = [marked for _, marked in terms]
