@@ -27,11 +27,19 @@ class Frictionless(Law):
         if np.any(self.mu):
             raise InputError("contact without friction has mu = 0; for another value use the law 'coulomb'.")
 
+    def idle(self, y: np.ndarray) -> np.ndarray:
+        return np.asarray(y[:, 0] <= 0)
+
     def bound(self, r_n: np.ndarray) -> np.ndarray:
         return np.zeros(len(r_n))
 
     def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
         return cylinder_derivative(y, np.zeros(len(y)))
+
+    def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
+        out = np.zeros(y.shape)
+        out[:, 0] = np.maximum(y[:, 0], 0.0)
+        return out
 
     @classmethod
     def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Frictionless:
