@@ -43,8 +43,8 @@ class HalfSpaceBody:
     outward: float
     thickness: float
 
-    meshed = complete = iterative = True
-    parallel = False
+    meshed = complete = True
+    iterative = parallel = False
 
     @property
     def name(self) -> str:
@@ -138,6 +138,7 @@ class HalfSpaceBody:
         raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
 
     def iterates(self, solver: str) -> bool:
+        """Its products are so cheap that an array of its compliance never pays."""
         return True
 
     def prepare(self, solver: str, entries: bool) -> HalfSpaceBody:

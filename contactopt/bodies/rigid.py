@@ -1,7 +1,8 @@
 """A rigid body: its compliance is zero, and its displacement unknowns are its motions.
 
 It has one unknown for each component of a translation. Those with a total force are free motions, whose displacements are
-multipliers of the interface problem; the others are given, by default zero.
+multipliers of the interface problem; the others are given, by default zero. The total contact force follows them in U, so that the
+forces that hold the body are known from U.
 """
 
 from __future__ import annotations
@@ -34,12 +35,13 @@ class RigidBody:
     @property
     def at_rest(self) -> np.ndarray:
         values = self.part.displacement or {}
-        return np.array([float(values.get(name, 0.0)) for name in self.components])
+        given = [float(values.get(name, 0.0)) for name in self.components]
+        return np.array([*given, *(0.0 for _ in given)])
 
     @property
     def motions(self) -> np.ndarray:
         columns = [self.components.index(name) for name in self._force]
-        return np.eye(len(self.components))[:, columns]
+        return np.eye(2 * len(self.components))[:, columns]
 
     @property
     def resultants(self) -> np.ndarray:
@@ -58,7 +60,7 @@ class RigidBody:
             own = np.array(self.part.normal, dtype=float)
             normals = np.tile(own[:, None] / np.linalg.norm(own), k)
         fixed = np.array([name not in self._force for name in self.components])
-        trace = [sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, dim)) for c in range(dim)]
+        trace = [sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, 2 * dim)) for c in range(dim)]
         held = np.tile(fixed[:, None], k)
         surface = Surface(
             self.name, other.points, normals, other.areas, other.weights, other.places, tuple(trace), held, other.cells
@@ -94,14 +96,15 @@ class RigidBody:
         return np.zeros(T.shape[0], dtype=bool)
 
     def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        return np.asarray(self.at_rest + self.motions @ multipliers)
+        return np.asarray(self.at_rest + self.motions @ multipliers + np.roll(force, len(self.components)))
 
     def energy(self, U: np.ndarray) -> float:
         return 0.0
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """The total forces. What holds or displaces the other components is left out: U does not tell it."""
-        return np.asarray(self.motions @ self.resultants)
+        """The forces that keep the body in equilibrium with the contact forces."""
+        dim = len(self.components)
+        return np.concatenate([-U[dim:], np.zeros(dim)])
 
     def fields(self, U: np.ndarray) -> None:
         return None

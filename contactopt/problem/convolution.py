@@ -206,7 +206,7 @@ class Convolution(InterfaceOperator):
     def __init__(self, kernel: Kernel, accuracy: float | None = None):
         self.kernel = kernel
         count = int(np.prod(kernel.grid))
-        super().__init__(self._product, np.tile(kernel.diagonal, count), kernel.entries, accuracy, True)
+        super().__init__(self._product, np.tile(kernel.diagonal, count), kernel.entries, accuracy)
 
     def _product(self, X: np.ndarray, accuracy: float | None) -> np.ndarray:
         every = tuple(range(self.kernel.dim))

@@ -29,7 +29,7 @@ logger = logging.getLogger(__name__)
 
 LOOSEST, TIGHTEST = 0.1, 1e-4  # relative accuracy of a step: while contacts still open or close, and at last
 ROUGH = 3e-2  # residual at which a coarse grid has done its work, over the size of the forces
-NEAR = 1e-5  # and from which on iterates of the finest grid are shown to the driver
+NEAR = 1e-8  # and from which on iterates of the finest grid are shown to the driver
 STEPS = 30  # on a coarse grid
 
 
@@ -46,6 +46,11 @@ class Nested:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
+        for point, _ in self.steps(problem, start):
+            yield point
+
+    def steps(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[tuple[Iterate, float]]:
+        """Iterates on the finest grid with the residual of the equations."""
         if not isinstance(problem.Q, Convolution):
             raise InputError("the method 'nested' needs half-spaces on both sides, or one on a rigid body; use 'auto'.")
         levels = [Level.of_problem(problem)]
@@ -63,7 +68,7 @@ class Nested:
             point, at = (given, other) if other.residual < at.residual else (point, at)
         while True:
             if at.residual <= NEAR * max(1.0, float(np.linalg.norm(point[0]))) or at.residual > 0.5 * last:
-                yield whole(problem, point[0] + at.error), point[1]
+                yield (whole(problem, point[0] + at.error), point[1]), at.residual
             change, count = step(finest, at, worth(at.residual, last))
             last = at.residual
             point = point[0] + change[0], point[1] + change[1]
