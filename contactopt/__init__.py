@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from contactopt.errors import BackendError, InputError
     from contactopt.interface.reduction import reduce, reduce_bodies
     from contactopt.material import Material
-    from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
+    from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual, siconos_residual
     from contactopt.problem.transfer import transfer
     from contactopt.runner import Result, run
     from contactopt.scenes.scene import BodyForce, HalfSpace, Part, Plate, Rigid, Scene, Support, Traction
@@ -38,7 +38,7 @@ _HOMES = {
     "errors": ("BackendError", "InputError"),
     "bodies.fields": ("Fields",),
     "interface.reduction": ("reduce", "reduce_bodies"),
-    "problem": ("InterfaceProblem", "Solution", "Status", "natural_map_residual"),
+    "problem": ("InterfaceProblem", "Solution", "Status", "natural_map_residual", "siconos_residual"),
     "problem.transfer": ("transfer",),
     "runner": ("Result", "run"),
     "material": ("Material",),

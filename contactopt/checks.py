@@ -51,3 +51,38 @@ def real_array(name: str, value: Any) -> np.ndarray:
     if not np.all(np.isfinite(numbers)):
         raise InputError(f"{name} holds a number that is not finite.")
     return numbers
+
+
+# Names that Windows keeps for devices, whatever the extension.
+RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
+LONGEST_NAME = 100  # characters
+
+
+def check_name(what: str, name: object) -> None:
+    """Raise InputError unless the name can become a file's name in a folder, and can lead to no other folder.
+
+    Refused are names that are no text, empty, longer than 100 characters, or made of dots only; names with a slash, a
+    backslash, a colon or a character that cannot be printed; names that begin or end with a space; and the device
+    names of Windows.
+    """
+    wrong = ""
+    if not isinstance(name, str):
+        wrong = "it must be a text"
+    elif not name.strip(". "):
+        wrong = "it needs at least one character besides dots and spaces"
+    elif len(name) > LONGEST_NAME:
+        wrong = f"it has more than {LONGEST_NAME} characters"
+    elif set(name) & set("/\\:") or not name.isprintable():
+        wrong = "it holds a slash, a backslash, a colon or a character that cannot be printed"
+    elif name != name.strip():
+        wrong = "it begins or ends with a space"
+    elif name.partition(".")[0].strip().lower() in RESERVED:
+        wrong = "it is reserved by an operating system"
+    if wrong:
+        raise InputError(f"{what} {short(name)} cannot name a file: {wrong}.")
+
+
+def short(value: object, most: int = 60) -> str:
+    """The value as Python writes it, with its middle left out if that is longer than `most` characters."""
+    text = repr(value)
+    return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"

@@ -30,6 +30,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(f"contactopt: {error}", file=sys.stderr)
         return 2
+    except MemoryError:
+        print("contactopt: this needs more memory than there is; take fewer elements.", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("contactopt: interrupted", file=sys.stderr)
+        return 130
 
 
 def make_parser() -> argparse.ArgumentParser:

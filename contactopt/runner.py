@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
-import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.accuracy import Estimate, refine
-from contactopt.analysis.edges import contact_edge, stick_edge
 from contactopt.analysis.paths import PathResult, follow
-from contactopt.analysis.quantities import approach
+from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
+from contactopt.analysis.solve_scene import Options, Solved
 from contactopt.analysis.zone import solve_zone
 from contactopt.errors import InputError
+from contactopt.files import check_folder, whole_folder
 from contactopt.interface.recovery import Fields, recover
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
@@ -28,6 +27,8 @@ from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
 from contactopt.solving.methods import default_method, find_method
 
+# What a run writes beside summary.json and one VTU file per body.
+RUN_FILES = ("deformed.png", "pressure.png", "path.png", "interface.npz", "history.csv", "path.npz")
 Note = Callable[[str], None]
 PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work")
 
@@ -35,6 +36,9 @@ PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_ha
 @dataclass(frozen=True, eq=False)
 class Result:
     """A solved scene. `summary` is what summary.json holds; `zones` the half-widths of the contact-zone loop.
+
+    `summary["seconds"]` holds the wall time [s] of each phase: those of the solution (see contactopt.analysis.solve_scene),
+    `recover` of the fields, `figures` and `files` where some were asked for, and `total` of the whole run.
 
     `path` holds all states of a scene that has a load path; the rest of the result is then that of the last state.
     `estimate` is what refinement to an asked accuracy found.
@@ -81,87 +85,103 @@ def run(
     note: Note = lambda text: None,
     **changes: Any,
 ) -> Result:
-    """Solve a scene end to end, and write its figures and files into the directory `out` if one is given.
+    """Solve a scene end to end, and write its figures and files into a folder if one is given.
 
-    scene     a name (see contactopt.scenes.SCENES), `changes` to its arguments, with its load path if it has one
-              (PATHS); or a Scene, `changes` to its fields
-    method, normal, tangential   names; by default `auto`, or `alternating` if a backend is named
-    preconditioner   of methods that take products with Q, a name in contactopt.solving.preconditioners; selects Q = 'implicit'
-    Q, solver  form of Q and solver of the bodies, see reduce()
-    elements  across the contact half-width;  tol  bound on the natural-map residual;  note  receives progress messages
-    accuracy  bound on the estimated relative error of `quantity`, a name in contactopt.analysis.quantities.QUANTITIES: meshes are then
-              refined until it is met or a sentence says why not (Result.estimate); `elements` only scales the first mesh
-    Raises InputError with a sentence that says what to do; nothing is left half-written.
+    Parameters
+    ----------
+    scene : a name (see contactopt.scenes.SCENES), which is solved along its load path if it has one (PATHS); or a Scene
+    out : folder for the files; None: nothing is written
+    method, normal, tangential : names; by default `auto`, or `alternating` if a backend is named
+    preconditioner : a name in contactopt.solving.preconditioners, of methods that take products with Q; it selects
+        Q = 'implicit'
+    Q, solver : form of Q and solver of the bodies, see reduce()
+    tol : bound on the natural-map residual
+    elements : across the contact half-width
+    accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
+        sentence in `Result.estimate` says why not; `elements` only scales the first mesh
+    quantity : a name in contactopt.analysis.quantities.QUANTITIES
+    note : receives progress messages
+    changes : to the arguments of a named scene, or to the fields of a Scene
+
+    Raises
+    ------
+    InputError : on input that cannot be used, with a sentence that says what to do; nothing is left half-written
     """
     start = time.perf_counter()
-    if elements is not None:
-        changes["elements"] = elements
-    states = make_path(scene, **changes) if isinstance(scene, str) and scene in PATHS else ()
-    if isinstance(scene, str):
-        scene = states[-1] if states else make_scene(scene, **changes)
-    else:
-        scene = _changed(scene, changes)
-    if preconditioner is not None and Q == "explicit":
-        raise InputError("a preconditioner serves products with Q, but Q = 'explicit' was asked for; drop one of them.")
-    Q = "implicit" if preconditioner is not None else Q
+    states = _states(scene, changes | ({} if elements is None else {"elements": elements}))
     names = {"normal": normal, "tangential": tangential, "preconditioner": preconditioner}
     given = {key: name for key, name in names.items() if name is not None}
     method = method or default_method(given)
     chosen = find_method(method, **given)
-    backends = chosen.backends(scene.dim)  # refused here, before any work, if one of them cannot be used
-    if (accuracy is None) != (quantity is None):
-        raise InputError("accuracy and quantity belong together: the bound, and the name of what it bounds.")
-    target = None if out is None else _writable(Path(out))
-    path, zones, estimate = None, list[float](), None
-    if accuracy is not None and quantity is not None:
-        refined, estimate = refine(states or (scene,), quantity, accuracy, note, Q, solver, method=chosen, tol=tol)
-        reduction, solution, zones, path = refined.reduction, refined.solution, list(refined.zones), refined.path
-        scene = reduction.scene
-    elif states:
-        path = follow(states, note=note, Q=Q, solver=solver, method=chosen, tol=tol)
-        scene, reduction, solution = path.states[-1].scene, path.reduction, path.solution
-    else:
-        reduction, solution, zones = solve_zone(scene, note=note, Q=Q, solver=solver, method=chosen, tol=tol)
-    seconds = dict(solution.seconds)
-    with _Timer(seconds, "recover"):
-        fields = recover(reduction, solution)
-    summary = _summary(scene, reduction, solution, method, backends, zones)
-    if path is not None:
-        summary |= {"states": len(path.states)} | {key: float(path.history[key][-1]) for key in PATH_KEYS}
-    if estimate is not None:
-        summary["accuracy"] = asdict(estimate)
-    result = Result(scene, reduction, solution, fields, tuple(zones), summary, path, estimate)
-    summary["seconds"] = seconds
-    if target is not None:
-        note("drawing figures, writing files")
-        _write(result, target, seconds, start)
-    seconds["total"] = time.perf_counter() - start
-    return result
+    backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
+    options = Options(_form(Q, preconditioner), solver, chosen, tol, note=note)
+    if out is not None:
+        check_folder(Path(out))
+    solved, path, estimate = _solve(states, accuracy, quantity, options)
+    seconds = dict(solved.solution.seconds)
+    with _clock(seconds, "recover"):
+        fields = recover(solved.reduction, solved.solution)
+    summary = _summary(solved, method, backends, path, estimate)
+    made = Result(
+        solved.reduction.scene, solved.reduction, solved.solution, fields, solved.zones, summary, path, estimate
+    )
+    if out is None:
+        return replace(made, summary=summary | _seconds(seconds, start))
+    note("drawing figures, writing files")
+    with whole_folder(out, _earlier_files(Path(out))) as folder:
+        with _clock(seconds, "figures"):
+            _draw(made, folder)
+        with _clock(seconds, "files"):
+            _write(made, folder)
+        made = replace(made, summary=summary | _seconds(seconds, start))
+        (folder / "summary.json").write_text(json.dumps(made.summary, indent=2) + "\n")
+    return made
 
 
-def _changed(scene: Scene, changes: dict[str, Any]) -> Scene:
+def _states(scene: str | Scene, changes: dict[str, Any]) -> tuple[Scene, ...]:
+    """The scene, or the states of its load path."""
+    if isinstance(scene, str):
+        return make_path(scene, **changes) if scene in PATHS else (make_scene(scene, **changes),)
     try:
-        return replace(scene, **changes)
+        return (replace(scene, **changes),)
     except TypeError as error:
         raise InputError(f"scene '{scene.name}': {error}.") from error
 
 
+def _form(Q: str, preconditioner: str | None) -> str:
+    if preconditioner is None:
+        return Q
+    if Q == "explicit":
+        raise InputError("a preconditioner serves products with Q, but Q = 'explicit' was asked for; drop one of them.")
+    return "implicit"
+
+
+def _solve(
+    states: tuple[Scene, ...], accuracy: float | None, quantity: str | None, options: Options
+) -> tuple[Solved, PathResult | None, Estimate | None]:
+    """One of three loops: refinement to an accuracy, a load path, or the contact zone of one scene."""
+    if (accuracy is None) != (quantity is None):
+        raise InputError("accuracy and quantity belong together: the bound, and the name of what it bounds.")
+    if accuracy is not None and quantity is not None:
+        mesh, estimate = refine(states, quantity, accuracy, options)
+        return mesh.solved, mesh.path, estimate
+    if len(states) > 1:
+        path = follow(states, note=options.note, Q=options.Q, solver=options.solver, **options.of_solve)
+        return Solved(path.reduction, path.solution), path, None
+    return solve_zone(states[0], options=options), None, None
+
+
 def _summary(
-    scene: Scene,
-    reduction: Reduction,
-    solution: Solution,
-    method: str,
-    backends: tuple[str, str],
-    zones: list[float],
+    solved: Solved, method: str, backends: tuple[str, str], path: PathResult | None, estimate: Estimate | None
 ) -> dict[str, Any]:
+    """What is known of the answer but for the seconds: half-widths and pressure are the quantities that accuracy bounds."""
+    reduction, solution = solved.reduction, solved.solution
     problem, r = reduction.problem, solution.reactions
-    width = zones[-1] if zones else contact_edge(scene, problem, r)
-    slip = problem.displacements(r, solution.multipliers)[:, 1:]
-    return {
-        "scene": scene.name,
+    summary: dict[str, Any] = {
+        "scene": reduction.scene.name,
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
-        "mu": float(scene.mu if isinstance(scene.mu, (int, float)) else problem.mu.mean()),
+        "mu": float(problem.mu.max(initial=0.0)),
         "method": method,
         "normal_backend": backends[0],
         "tangential_backend": backends[1],
@@ -170,72 +190,33 @@ def _summary(
         "outer_iterations": solution.iterations,
         "normal_force": float(r[:, 0].sum()),
         "approach": approach(problem, solution),
-        "contact_half_width": float(width),
-        "stick_half_width": min(float(width), stick_edge(scene, problem, r, slip)[0]),
+        "contact_half_width": width(reduction, solution),
+        "stick_half_width": stick_width(reduction, solution)[0],
         "max_pressure": float((r[:, 0] / problem.areas).max()),
+        "pressure": peak_pressure(reduction, solution),
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
     }
+    if path is not None:
+        summary |= {"states": len(path.states)} | {key: float(path.history[key][-1]) for key in PATH_KEYS}
+    if estimate is not None:
+        summary["accuracy"] = asdict(estimate)
+    return summary
 
 
 def _squeeze(t: np.ndarray) -> np.ndarray:
     return t[:, 0] if t.shape[1] == 1 else t
 
 
-class _Timer:
-    def __init__(self, seconds: dict[str, float], phase: str):
-        self.seconds, self.phase = seconds, phase
-
-    def __enter__(self) -> None:
-        self.start = time.perf_counter()
-
-    def __exit__(self, *error: object) -> None:
-        self.seconds[self.phase] = time.perf_counter() - self.start
+@contextmanager
+def _clock(seconds: dict[str, float], phase: str) -> Iterator[None]:
+    begin = time.perf_counter()
+    yield
+    seconds[phase] = time.perf_counter() - begin
 
 
-def _writable(out: Path) -> Path:
-    """Check, before any work, that files can be put there; InputError if not. Leaves nothing behind."""
-    existing = out
-    while not existing.exists() and existing != existing.parent:
-        existing = existing.parent
-    try:
-        if not existing.is_dir():
-            raise NotADirectoryError(f"{existing} is not a directory")
-        with tempfile.TemporaryFile(dir=existing):
-            pass
-    except OSError as error:
-        raise _unwritable(out, error) from error
-    return out
-
-
-def _unwritable(out: Path, error: OSError) -> InputError:
-    return InputError(f"cannot write into '{out}': {error.strerror or error}; choose another output directory.")
-
-
-def _write(result: Result, out: Path, seconds: dict[str, float], start: float) -> None:
-    """All files into a temporary neighbour first, then into place."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        staging = Path(tempfile.mkdtemp(prefix=".contactopt-", dir=out))
-    except OSError as error:
-        raise _unwritable(out, error) from error
-    try:
-        with _Timer(seconds, "figures"):
-            _draw(result, staging)
-        with _Timer(seconds, "files"):
-            for fields in result.fields:
-                fields.write_vtu(staging / f"{fields.name}.vtu")
-            _write_interface(result, staging / "interface.npz")
-            if result.path is not None:
-                result.path.write(staging)
-        seconds["total"] = time.perf_counter() - start
-        (staging / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")
-        for file in staging.iterdir():
-            os.replace(file, out / file.name)
-    except OSError as error:
-        raise _unwritable(out, error) from error
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+def _seconds(seconds: dict[str, float], start: float) -> dict[str, Any]:
+    return {"seconds": seconds | {"total": time.perf_counter() - start}}
 
 
 def _draw(result: Result, folder: Path) -> None:
@@ -250,7 +231,37 @@ def _draw(result: Result, folder: Path) -> None:
         path_figure(result.path).savefig(folder / "path.png", dpi=130)
 
 
-def _write_interface(result: Result, path: Path) -> None:
+def _write(result: Result, folder: Path) -> None:
+    for fields in result.fields:
+        fields.write_vtu(folder / f"{fields.name}.vtu")
     problem, r = result.problem, result.solution.reactions
-    x = problem.coordinates[:2].T if problem.dim == 3 else problem.coordinates[0]
-    np.savez(path, x=x, r_n=r[:, 0], r_t=_squeeze(r[:, 1:]), pressure=result.pressure, traction=result.traction)
+    x = problem.chart.places.T if problem.dim == 3 else problem.chart.places[0]
+    np.savez(
+        folder / "interface.npz",
+        x=x,  # along the contact surface
+        coordinates=problem.coordinates,
+        r_n=r[:, 0],
+        r_t=_squeeze(r[:, 1:]),
+        pressure=result.pressure,
+        traction=result.traction,
+    )
+    if result.path is not None:
+        result.path.write(folder)
+
+
+def _earlier_files(folder: Path) -> set[str]:
+    """Names of the files that an earlier `contactopt run` wrote into the folder; empty where none has run.
+
+    A folder in which one has run holds its summary.json. Its other files have fixed names, but for one VTU file per body:
+    those are told from other people's by the field von_mises in them.
+    """
+    with suppress(OSError, ValueError, TypeError):
+        if "contact_nodes" in json.loads(_plain_text(folder / "summary.json")):
+            fields = {file.name for file in folder.glob("*.vtu") if '"von_mises"' in _plain_text(file)}
+            return fields | {name for name in RUN_FILES if (folder / name).exists()}
+    return set()
+
+
+def _plain_text(file: Path) -> str:
+    """What a regular file holds; nothing for links and devices."""
+    return "" if file.is_symlink() or not file.is_file() else file.read_text(errors="replace")

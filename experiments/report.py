@@ -54,7 +54,7 @@ def write(
     path = REPORTS / page.format(name=name)
     home = os.path.relpath(folder, path.parent)
     pictures = "\n\n".join(f"![{stem}]({os.path.normpath(f'{home}/{stem}.png')})" for stem in figures)
-    foot = f"Made by `python -m experiments.{name}`.\nEnvironment: {environment()}."
+    foot = f"Made by `python -m experiments.questions.{name}`.\nEnvironment: {environment()}."
     path.write_text(f"# {title}\n\n{body}\n\n{pictures}\n\n{foot}\n".replace("\n\n\n\n", "\n\n"))
     print(path.read_text())
 

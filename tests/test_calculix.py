@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, reduce, scenes
-from experiments import calculix
-from experiments.calculix_deck import LAWS, Contact, deck, model
-from experiments.calculix_run import RIGID, Bench, difference, linear, printed, punch
+from experiments.questions.calculix import __main__ as calculix
+from experiments.questions.calculix.deck import LAWS, Contact, deck, model
+from experiments.questions.calculix.run import RIGID, Bench, difference, linear, printed, punch
 
 CCX = shutil.which("ccx")
 needs_ccx = pytest.mark.skipif(CCX is None, reason="CalculiX (ccx) is not installed")
@@ -137,7 +137,7 @@ def test_contact_agrees():
 @needs_ccx
 def test_failure_is_a_row(monkeypatch):
     bench = Bench(CCX, punch(elements=4))
-    monkeypatch.setattr("experiments.calculix_run.LIMIT", 0.0)
+    monkeypatch.setattr("experiments.questions.calculix.run.LIMIT", 0.0)
     row = bench.row("node-to-surface", 100.0)
     assert row["end"].startswith("no answer") and row["force"] == ""
 

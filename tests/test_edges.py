@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from contactopt import InterfaceProblem, Part, Rigid, Scene
 from contactopt.analysis.edges import contact_edge, stick_edge
 from contactopt.material import Material
+from contactopt.problem.chart import Chart
 
 PART = Part("body", None, Material(1.0, 0.3))
 
@@ -50,13 +53,82 @@ def test_stick_edge_after_a_reversal():
     assert stick_edge(scene, problem, r)[0] == pytest.approx(0.7, rel=1e-9)
 
 
-def test_a_zone_elsewhere_is_read_by_its_area():
+@pytest.mark.parametrize("centre,a", [(0.5, 0.5), (-0.313, 0.6), (0.0, 0.987)])
+def test_a_zone_anywhere_is_read_at_both_ends(centre, a):
     x = np.linspace(-1.25, 1.25, 101)
     scene, problem = contact(x[None], "plane-strain", np.full(101, 0.025))
-    p = np.sqrt(np.maximum(0.0, 1 - ((x - 0.5) / 0.5) ** 2))
-    r = 0.025 * np.stack([p, 0 * p], axis=1)
-    assert contact_edge(scene, problem, r) == pytest.approx(0.5, abs=0.03)
-    assert stick_edge(scene, problem, r)[0] == contact_edge(scene, problem, r)
+    p, q = cattaneo(np.abs(x - centre), a, 0.6 * a)
+    r = 0.025 * np.stack([p, -q], axis=1)
+    assert contact_edge(scene, problem, r) == pytest.approx(a, rel=1e-9)
+    assert stick_edge(scene, problem, r)[0] == pytest.approx(0.6 * a, rel=1e-9)
+
+
+def test_a_stick_zone_off_the_centre_of_contact():
+    x = np.linspace(-1.25, 1.25, 201)
+    scene, problem = contact(x[None], "plane-strain", np.full(201, 0.0125))
+    p = np.sqrt(np.maximum(0.0, 1 - x**2))
+    stuck = np.sqrt(np.maximum(0.0, 1 - ((x - 0.2) / 0.5) ** 2))
+    r = 0.0125 * np.stack([p, -0.5 * (p - 0.4 * stuck)], axis=1)
+    assert stick_edge(scene, problem, r)[0] == pytest.approx(0.5, rel=1e-9)
+
+
+def test_several_patches_add_up():
+    x = np.linspace(-2.0, 2.0, 401)
+    scene, problem = contact(x[None], "plane-strain", np.full(401, 0.01))
+    p = sum(np.sqrt(np.maximum(0.0, 1 - ((x - c) / a) ** 2)) for c, a in ((-1.1, 0.413), (0.9, 0.718)))
+    r = 0.01 * np.stack([p, 0 * p], axis=1)
+    assert contact_edge(scene, problem, r) == pytest.approx(0.413 + 0.718, rel=1e-9)
+
+
+def test_a_zone_that_ends_at_a_corner_on_one_side():
+    """Contact from the end of the surface to 0.4: the half-width is half the distance of the two."""
+    x = np.linspace(-1.0, 1.0, 101)
+    scene, problem = contact(x[None], "plane-strain", np.full(101, 0.02))
+    p = np.sqrt(np.maximum(0.0, 0.403 - x) * np.maximum(0.0, x + 1.597))  # zero at .403, its mirror image at -1.597
+    r = 0.02 * np.stack([p, 0 * p], axis=1)
+    assert contact_edge(scene, problem, r) == pytest.approx((1 + 0.403) / 2, rel=2e-3)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_half_model_is_read_as_the_whole(sign):
+    """Half of a contact, and a patch beside the plane of symmetry, against all of their images."""
+    half, full = np.linspace(0.0, 2.0, 161), np.linspace(-2.0, 2.0, 321)
+    for p in (
+        lambda x: np.sqrt(np.maximum(0.0, 1 - (x / 0.987) ** 2)),
+        lambda x: np.sqrt(np.maximum(0.0, 1 - ((np.abs(x) - 1) / 0.613) ** 2)),
+    ):
+        scene, problem = contact(full[None], "plane-strain", np.full(321, 0.0125))
+        whole = contact_edge(scene, problem, 0.0125 * np.stack([p(full), 0 * full], axis=1))
+        scene, problem = contact(half[None], "plane-strain", 0.025 * np.where(half == 0, 0.5, 1.0))
+        problem = replace(problem, chart=Chart(sign * half[None], (True,)))
+        r = problem.areas[:, None] * np.stack([p(half), 0 * half], axis=1)
+        assert contact_edge(scene, problem, r) == pytest.approx(whole, rel=1e-9)
+
+
+@pytest.mark.parametrize("centre", [0.0, 1.0, 3.1, 5.9])
+def test_a_zone_across_the_seam_of_a_closed_line(centre):
+    """The same zone anywhere on a closed line of length 2 pi, also across the place where its numbering begins."""
+    angle = np.linspace(0.0, 2 * np.pi, 240, endpoint=False)
+    space = np.stack([np.cos(angle), np.sin(angle)])
+    scene, problem = contact(space, "plane-strain", np.full(240, 2 * np.pi / 240))
+    problem = replace(problem, chart=Chart(angle[None], (False,), 2 * np.pi))
+    apart = (angle - centre + np.pi) % (2 * np.pi) - np.pi
+    p, q = cattaneo(np.abs(apart), 0.987, 0.613)
+    r = problem.areas[:, None] * np.stack([p, -q], axis=1)
+    assert contact_edge(scene, problem, r) == pytest.approx(0.987, rel=1e-9)
+    assert stick_edge(scene, problem, r)[0] == pytest.approx(0.613, rel=1e-9)
+
+
+def test_a_disc_off_the_origin_and_turned():
+    grid = np.linspace(-1.25, 1.25, 41)
+    x = np.stack(np.meshgrid(grid, grid)).reshape(2, -1)
+    turn = np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
+    for places, centre in ((x, (0.25, -0.125)), (turn @ x, turn @ (0.25, -0.125))):
+        scene, problem = contact(places, "solid", np.full(1681, (2.5 / 40) ** 2))
+        p, q = cattaneo(np.linalg.norm(places - np.array(centre)[:, None], axis=0), 0.787, 0.513)
+        r = (2.5 / 40) ** 2 * np.stack([p, -0.6 * q, 0.8 * q], axis=1)
+        assert contact_edge(scene, problem, r) == pytest.approx(0.787, rel=1e-3)
+        assert stick_edge(scene, problem, r)[0] == pytest.approx(0.513, rel=1e-3)
 
 
 def test_all_or_nothing_sticks():

@@ -31,7 +31,7 @@ from contactopt.interface.recovery import recover
 from contactopt.material import lame
 from contactopt.scenes.common import with_elements
 from contactopt.scenes.meshes import rename, simplices, tensor_mesh
-from experiments import elements as experiment
+from experiments.questions import elements as experiment
 
 KINDS = ["plane-strain", "axisymmetric", "solid"]
 AREA = {"plane-strain": 1.0, "axisymmetric": np.pi, "solid": 1.0}

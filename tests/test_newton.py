@@ -20,7 +20,7 @@ from contactopt.solving.kernels.alart_curnier import coulomb_equations
 from contactopt.solving.kernels.bonded import Bonded
 from contactopt.solving.kernels.semismooth import Equations
 from contactopt.solving.methods.auto import Auto
-from experiments.robustness import rigid_bodies
+from experiments.questions.robustness import rigid_bodies
 
 SMALL = {"punch-2d": 16, "punch-3d": 5, "sphere": 12}
 

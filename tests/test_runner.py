@@ -7,6 +7,7 @@ from conftest import two_blocks
 
 import contactopt
 from contactopt import InputError, cli, run
+from contactopt.analysis.quantities import QUANTITIES
 
 KEYS = [
     "scene",
@@ -24,6 +25,7 @@ KEYS = [
     "contact_half_width",
     "stick_half_width",
     "max_pressure",
+    "pressure",
     "q",
     "products",
     "seconds",
@@ -154,10 +156,37 @@ def test_a_failure_while_writing_leaves_old_results_alone(tmp_path, monkeypatch)
     run("punch-2d", tmp_path, elements=4)
     before = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
 
-    def broken(*_):
+    def broken(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("contactopt.runner._write_interface", broken)
+    monkeypatch.setattr("numpy.savez", broken)
     with pytest.raises(InputError, match="No space left"):
         run("punch-2d", tmp_path, elements=4, mu=0.1)
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    "quantity,key", [("width", "contact_half_width"), ("pressure", "pressure"), ("approach", "approach")]
+)
+def test_the_summary_reports_what_accuracy_bounds(quantity, key):
+    result = run("cylinder-2d", accuracy=0.05, quantity=quantity)
+    assert result.summary[key] == result.estimate.value
+
+
+def test_the_summary_reports_the_stick_zone_that_accuracy_bounds():
+    result = run("punch-2d", mu=0.2, accuracy=0.2, quantity="stick")
+    ratio = result.summary["stick_half_width"] / result.summary["contact_half_width"]
+    assert ratio == pytest.approx(result.estimate.value, rel=1e-12)
+
+
+def test_the_history_of_a_path_holds_the_quantities_that_accuracy_bounds():
+    path = run("cattaneo-2d", steps=1, elements=16).path
+    a, c = path.history["contact_half_width"][-1], path.history["stick_half_width"][-1]
+    assert QUANTITIES["width"](path.reduction, path.solution) == pytest.approx(a, rel=1e-10)
+    assert QUANTITIES["stick"](path.reduction, path.solution) == pytest.approx(c / a, rel=1e-10)
+
+
+def test_the_summary_on_disk_is_that_of_the_result(tmp_path):
+    result = run("punch-2d", tmp_path, elements=4)
+    assert json.loads((tmp_path / "summary.json").read_text()) == result.summary
+    assert {"solve", "recover", "figures", "files", "total"} <= set(result.summary["seconds"])

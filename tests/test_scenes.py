@@ -84,7 +84,7 @@ def test_cylinder_is_hertz():
     scene = make_scene("cylinder-2d")
     _, problem, r = ends(scene)
     exact = scene.reference
-    assert contact_edge(scene, problem, r) == pytest.approx(exact.half_width, rel=2e-3)
+    assert contact_edge(scene, problem, r) == pytest.approx(exact.half_width, rel=3e-3)
     assert (r[:, 0] / problem.areas).max() == pytest.approx(exact.peak, rel=2e-3)
     smooth = solve(reduce(scenes.cylinder(mu=0.0))).reactions  # similar materials: friction changes nothing
     assert np.abs(smooth[:, 0] - r[:, 0]).max() < 2e-3 * r[:, 0].max()

@@ -103,6 +103,53 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(built):
     assert (built / "_static" / "mathjax" / "tex-chtml.js").exists()
 
 
+@pytest.fixture
+def reference(monkeypatch):
+    monkeypatch.syspath_prepend(str(SITE))
+    import reference
+
+    return reference
+
+
+def test_every_room_has_a_page_that_names_its_modules(reference):
+    pages = dict(reference.room_pages(ROOT))
+    rooms = {
+        path.stem for path in (ROOT / "contactopt").iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()
+    }
+    rooms -= {"__init__", "__main__"}
+    assert rooms == set(reference.ROOMS) == set(reference.rooms(ROOT)), "give the new room a sentence in ROOMS"
+    for room in rooms:
+        page = pages[Path("api", f"{room}.md")]
+        assert reference.ROOMS[room] in page
+        for path in (ROOT / "contactopt" / room).glob("[a-z]*.py"):
+            assert f"automodule:: contactopt.{room}.{path.stem}\n" in page
+    for name in re.findall(r"\]\(api/(\w+)\.md\)", pages[Path("api.md")]):
+        assert name in rooms
+
+
+def test_every_entry_of_every_table_is_on_its_page(reference):
+    from contactopt.bodies.solvers import SOLVERS
+    from contactopt.scenes import SCENES
+    from contactopt.solving.backends import CONIC, QP
+    from contactopt.solving.preconditioners import PRECONDITIONERS
+
+    pages = {str(path): page for path, page in reference.plug_in_pages(SITE)}
+    tables = {"scenes": SCENES, "preconditioners": PRECONDITIONERS, "body_solvers": SOLVERS, "backends": QP | CONIC}
+    laws = reference.optional("contactopt.problem.laws", "LAWS")
+    couplings = reference.optional("contactopt.interface.coupling", "COUPLINGS")
+    for name, table in (tables | {"laws": laws, "couplings": couplings}).items():
+        assert (f"{name}.md" in pages) == bool(table)
+        listed = re.findall(r"^\| `([\w-]+)` \|", pages.get(f"{name}.md", ""), re.M)
+        assert set(listed) == set(table)
+
+
+@pytest.mark.parametrize("path", sorted(SITE.glob("*.md")), ids=lambda path: path.stem)
+def test_python_on_pages_written_by_hand_runs(path, capsys):
+    for code in re.findall(r"```python\n(.*?)```", path.read_text(), re.S):
+        exec(compile(code, path.name, "exec"), {})
+        assert "solved" in capsys.readouterr().out
+
+
 def test_what_is_written_by_hand_belongs_to_a_method():
     for path in (SITE / "notes").glob("*.md"):
         assert path.stem in METHODS
@@ -112,7 +159,7 @@ def test_what_is_written_by_hand_belongs_to_a_method():
 
 def test_docstrings_become_harmless_restructured_text(monkeypatch):
     monkeypatch.syspath_prepend(str(SITE))
-    from generate import as_rst
+    from docstrings import as_rst
 
     lines = [
         "Bound |r_t| <= mu * r_n_ of `solve`:",

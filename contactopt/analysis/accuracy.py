@@ -22,30 +22,25 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from contactopt.analysis.constants import BELOW, FIRST, LARGEST, SLOWEST, STUCK
 from contactopt.analysis.paths import PathResult, follow
 from contactopt.analysis.quantities import QUANTITIES, at_rim, uncertainty
-from contactopt.analysis.zone import AGREE, LOOPS, contact_half_width, pressed
+from contactopt.analysis.solve_scene import Options, Solved
+from contactopt.analysis.zone import solve_zone
 from contactopt.bodies.refinement import split_scene
 from contactopt.checks import check_number
 from contactopt.errors import InputError
-from contactopt.interface.reduction import Reduction, reduce_bodies
+from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution
-from contactopt.problem.transfer import transfer
 from contactopt.scenes.scene import Scene
-from contactopt.solving.driver import solve
 
-COARSEST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least
-BELOW = 8  # and by how much fewer than the scene's default
-LARGEST = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about a gigabyte and half a minute
-SLOWEST = 0.75  # least order that is believed: slower ones were noise wherever the exact value was known
 EDGES = ("width", "stick")
-STUCK = 0.1  # order below which a sequence does not converge
 
 
 @dataclass(frozen=True)
@@ -87,14 +82,20 @@ class Estimate:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
-    """A solved mesh: `path` if the scene has one, `zones` of the zone loop."""
+class Mesh:
+    """A scene solved on one mesh; `path` if the scene has a load path, whose last state it then is."""
 
     level: Level
-    reduction: Reduction
-    solution: Solution
-    zones: tuple[float, ...] = ()
+    solved: Solved
     path: PathResult | None = None
+
+    @property
+    def reduction(self) -> Reduction:
+        return self.solved.reduction
+
+    @property
+    def solution(self) -> Solution:
+        return self.solved.solution
 
     @property
     def failure(self) -> str:
@@ -105,25 +106,29 @@ class Solved:
 
 
 def refine(
-    states: Sequence[Scene],
-    quantity: str,
-    accuracy: float,
-    note: Callable[[str], None] = lambda text: None,
-    Q: str = "auto",
-    solver: str = "auto",
-    **settings: Any,
-) -> tuple[Solved, Estimate]:
+    states: Sequence[Scene], quantity: str, accuracy: float, options: Options | None = None
+) -> tuple[Mesh, Estimate]:
     """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
 
-    quantity  a name in QUANTITIES;  accuracy  bound on its estimated relative error, between 0 and 1
-    Q, solver, settings  as for solve_zone()
-    Ends short of the target, with a sentence in the estimate, where the quantity does not converge, the next mesh would have
-    more than LARGEST unknowns, or a solve fails. Raises InputError for an unknown quantity or an accuracy out of range.
+    It ends short of the target, with a sentence in the estimate, where the quantity does not converge, where the next mesh
+    would have more than LARGEST unknowns, or where a solve fails.
+
+    Parameters
+    ----------
+    states : the scene, or the states of its load path
+    quantity : a name in QUANTITIES
+    accuracy : bound on the estimated relative error of the quantity, between 0 and 1
+    options : how each mesh is solved
+
+    Raises
+    ------
+    InputError : for an unknown quantity or an accuracy out of range
     """
+    options = options or Options()
     if quantity not in QUANTITIES:
         raise InputError(f"unknown quantity {quantity!r}; choose from {', '.join(QUANTITIES)}.")
     check_number("the accuracy", accuracy, low=0.0, high=1.0)
-    search = _Search(tuple(states), quantity, note, {"Q": Q, "solver": solver}, settings)
+    search = _Search(tuple(states), quantity, options)
     while True:
         mesh, order, grading = *search.mesh_error(), search.grading_error()
         read, scale = search.meshes[-1].uncertainty, abs(search.meshes[-1].value) or 1.0
@@ -131,14 +136,15 @@ def refine(
         message = in_vain = search.obstacle()
         if in_vain or error <= accuracy:
             break
-        note(f"{quantity} {search.meshes[-1].value:.6g}, estimated error {error:.1e}")
+        options.note(f"{quantity} {search.meshes[-1].value:.6g}, estimated error {error:.1e}")
         message = search.finer_grading() if abs(grading) > max(abs(mesh), read) else search.finer_mesh()
         if message:
             break
     last = search.final()
     message = message or last.failure
-    coarse = sum(level.seconds for level in search.levels) - last.level.seconds
-    last = replace(last, solution=replace(last.solution, seconds=last.solution.seconds | {"coarse": coarse}))
+    seconds = Counter(last.solution.seconds)
+    seconds.update({"coarse": sum(level.seconds for level in search.levels) - last.level.seconds})
+    last = replace(last, solved=replace(last.solved, solution=replace(last.solution, seconds=dict(seconds))))
     value = last.level.value
     parts: dict[str, Any] = dict.fromkeys(("extrapolated", "error", "mesh_error", "grading_error", "order"))
     if not in_vain and np.isfinite(error):
@@ -173,18 +179,18 @@ class _Search:
     share    by which the first split multiplies the unknowns
     """
 
-    def __init__(self, states, quantity, note, forms, settings):  # type: ignore[no-untyped-def]
-        self.states, self.quantity, self.note, self.forms, self.settings = states, quantity, note, forms, settings
+    def __init__(self, states: tuple[Scene, ...], quantity: str, options: Options):
+        self.states, self.quantity, self.options = states, quantity, options
         scene = states[-1]
         self.given = scene.given
-        self.first = scene.elements if self.given else max(COARSEST[scene.dim], scene.elements // BELOW)
+        self.first = scene.elements if self.given else max(FIRST[scene.dim], scene.elements // BELOW)
         self.best = 2 if quantity in EDGES else 2 * scene.degree
         self.levels: list[Level] = []
         self.meshes: list[Level] = []
         self.changes: list[float] = []
         self.splits, self.share = 0, 1.0
-        self.last: Solved | None = None
-        self.split_last: Solved | None = None
+        self.last: Mesh | None = None
+        self.split_last: Mesh | None = None
         self._refine_mesh()
         while len(self.meshes) < 3 and not self.obstacle() and not self.finer_mesh():
             pass
@@ -239,7 +245,7 @@ class _Search:
         self._split(self.splits, elements)
         return ""
 
-    def final(self) -> Solved:
+    def final(self) -> Mesh:
         """The last mesh with the present splits."""
         assert self.last is not None
         wanted = self.last.level.elements, self.last.level.splits if self.given else self.splits
@@ -271,41 +277,19 @@ class _Search:
             self.share = self.split_last.level.unknowns / self.meshes[-1].unknowns
         self.changes[splits - 1 :] = [self.split_last.level.value - known[elements, splits - 1]]
 
-    def _solve(self, elements: int, splits: int) -> Solved:
-        self.note(f"{elements} elements across the half-width" + (f", {splits} splits" if splits else ""))
+    def _solve(self, elements: int, splits: int) -> Mesh:
+        self.options.note(f"{elements} elements across the half-width" + (f", {splits} splits" if splits else ""))
         begin = time.perf_counter()
         base = elements if self.given else elements // 2**splits
         states = [split_scene(scene, base, splits) for scene in self.states]
+        path, options = None, self.options
         if len(states) > 1:
-            path = follow(states, elements, **self.forms, **self.settings)
-            reduction, solution, zones = path.reduction, path.solution, list[float]()
+            path = follow(states, elements, Q=options.Q, solver=options.solver, **options.of_solve)
+            solved = Solved(path.reduction, path.solution)
         else:
-            path = None
-            reduction, solution, zones = self._zone_loop(states[0], elements)
+            solved = solve_zone(states[0], elements, options, None if self.last is None else self.last.solved)
+        reduction, solution, zones = solved.reduction, solved.solution, solved.zones
         value = QUANTITIES[self.quantity](reduction, solution), uncertainty(self.quantity, reduction, solution)
         size = reduction.dofs, reduction.problem.contacts, max(1, len(zones) - 1), zones[-2] if zones else None
         self.levels.append(Level(elements, splits, *size, *value, time.perf_counter() - begin))
-        return Solved(self.levels[-1], reduction, solution, tuple(zones), path)
-
-    def _zone_loop(self, scene: Scene, elements: int) -> tuple[Reduction, Solution, list[float]]:
-        """As solve_zone(), from the last mesh's zone and solution."""
-        before, seconds = self.last, Counter[str]()
-        known = before.zones[-1:] if before is not None else ()
-        zones = list(known) or ([] if scene.zone is None else [scene.zone])
-        source = None if before is None else (before.reduction.problem, before.solution)
-        while True:
-            reduction = reduce_bodies(scene, elements, zones[-1] if zones else None, **self.forms)
-            start = None if source is None else transfer(*source, reduction.problem)
-            solution = solve(reduction.problem, start=start, **self.settings)
-            source = reduction.problem, solution
-            seconds.update(reduction.seconds)
-            seconds.update(solution.seconds)
-            solution = replace(solution, seconds=dict(seconds))
-            if not zones:
-                return reduction, solution, zones
-            if pressed(solution.reactions).sum() < 2:
-                raise InputError(f"scene '{scene.name}': fewer than two nodes are in contact; take more elements.")
-            zones.append(contact_half_width(scene, reduction.problem, solution.reactions))
-            agreed = abs(zones[-1] - zones[-2]) <= AGREE * zones[-2] / elements
-            if agreed or not solution.solved or len(zones) > LOOPS:
-                return reduction, solution, zones
+        return Mesh(self.levels[-1], solved, path)

@@ -47,6 +47,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as la
 
+from contactopt.analysis.status import contact_status
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution, balance_residual, dimensionless, natural_map_residual
 from contactopt.problem.cones import coulomb_cone
@@ -263,10 +264,8 @@ def _local(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray, largest: f
     """Per closed contact  G D r_t + H D w = -mu d D g:  stick G = 0, H = I; slip along d; no friction G = I, d = 0."""
     k, dim = r.shape
     bound, force = problem.mu * np.abs(r[:, 0]), np.linalg.norm(r[:, 1:], axis=1)
-    size = np.abs(r[:, 0]).max(initial=0.0)
-    closed = (problem.law.lowest < 0) | (r[:, 0] > 1e-8 * size)
-    stick = closed & (force < (1 - 1e-6) * bound)
-    slip = closed & ~stick & (bound > 1e-8 * size)
+    status = contact_status(problem, r)
+    closed, stick, slip = status.touching, status.stick, status.slip & (problem.mu > 0) & (force > 0)
     counts = int(stick.sum()), int(slip.sum()), int((~closed).sum())
     if not np.any(closed):
         return Local(*counts, 0.0, 0.0, np.inf, np.inf)

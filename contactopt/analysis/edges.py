@@ -1,66 +1,155 @@
-"""Where contact and stick end, below the element size: read from how tractions and slip fall to zero.
+"""Where contact and stick end, below the element size: the one definition of the half-width of a zone.
 
-Next to an edge at distance c from the centre, the pressure (where contact ends by itself) and the slack of the
+Next to an edge at distance c from the centre of a zone, the pressure (where contact ends by itself) and the slack of the
 friction bound (where stick ends) are proportional to sqrt(c^2 - x^2), and the slip beyond c to (x - c)^(3/2). A straight
 line through the squares of values inside, against x^2, or through slip^(2/3), against x, meets zero at the edge.
 
-A discrete edge is at a node, and jumps from node to node as the exact one moves; the tractions and slips of the nodes
-next to it jump with it, those an element further hardly do. So the lines leave the nearest ones out: what they read then falls
-smoothly with the element size, as the estimate of an error needs it.
+The nodes at the edge of a discrete zone jump as the exact edge moves, and so do the values at the nodes next to it. The
+values an element further hardly do. The lines therefore leave the nearest nodes out: what they read then falls smoothly
+with the element size, as the estimate of an error needs it.
+
+A zone is read at each of its ends (contactopt.analysis.patches), wherever it lies on the contact surface. Its half-width is
+that of the strip, or the radius of the disc, with the same area. Where an end cannot be read, the nodal areas are counted.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial import KDTree
 
-from contactopt.analysis.zone import contact_half_width, pressed, stick_half_width, stuck
+from contactopt.analysis.constants import INNER, NEAR, OUTER, SMOOTH
+from contactopt.analysis.patches import End, patches_of
+from contactopt.analysis.status import contact_status
 from contactopt.problem import InterfaceProblem
 from contactopt.scenes.scene import Scene
 
-Window = tuple[int, int]  # distances from the centre next to the edge: how many are left out, how many are fitted
+Reader = Callable[[End], list[float]]
 
-SMOOTH: Window = 3, 6  # where contact ends by itself: the outermost carry most of the discretisation error
-NEAR: Window = 1, 2  # where the values are straight only next to the edge
+
+def equivalent_half_width(scene: Scene, area: float) -> float:
+    """Half-width of the strip, radius of the disc or half side of the square of that area [length]."""
+    if scene.kind == "plane-strain":
+        return area / (2 * scene.thickness)
+    return float(np.sqrt(area / np.pi) if scene.kind == "axisymmetric" else np.sqrt(area) / 2)
+
+
+def contact_area(scene: Scene, half_width: float) -> float:
+    """The inverse of equivalent_half_width."""
+    if scene.kind == "plane-strain":
+        return 2 * half_width * scene.thickness
+    return float(np.pi * half_width**2 if scene.kind == "axisymmetric" else 4 * half_width**2)
 
 
 def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
-    """Half-width of a contact zone about x = 0 [length]; where it is no such zone or ends at a corner, by its area."""
-    edge, pressure = _Edge.of(problem, pressed(reactions)), reactions[:, 0] / problem.areas
-    read = None if edge is None else edge.inner(pressure, SMOOTH)
-    if edge is None or read is None:
-        return contact_half_width(scene, problem, reactions)
-    return edge.clip(read)
+    """Half-width of the contact zone [length].
+
+    Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against x^2 over the whole
+    half-width, without the last two nodes, weighted by the nodal areas. Where that zero is not next to the last node, the
+    parabola goes through the outer half only. On a surface, where fewer than three nodes are left, and where the other end
+    is a corner, a straight line goes through the rings of nodes next to the edge. Where every node touches, or where
+    contact ends at a corner, the edge is that of the contact surface.
+
+    Parameters
+    ----------
+    reactions : (k, dim) nodal forces, normal first [force]
+    """
+    touching = contact_status(problem, reactions).touching
+    pressure = reactions[:, 0] / problem.areas
+
+    def read(end: End) -> list[float]:
+        for share in INNER if problem.dim == 2 and end.free else ():
+            edge = _zero_of_parabola(end, pressure, problem.areas, share)
+            if edge is not None and end.clip(edge) == edge:
+                return [edge]
+        edge = end.inner(pressure, SMOOTH)
+        return [] if edge is None else [end.clip(edge)]
+
+    return _half_width(scene, problem, touching, np.abs(reactions[:, 0]), read)[0]
 
 
 def stick_edge(
     scene: Scene, problem: InterfaceProblem, reactions: np.ndarray, slip: np.ndarray | None = None
 ) -> tuple[float, float]:
-    """Half-width of a stick zone about x = 0 and its uncertainty [length]; where it is no such zone, by its area.
+    """Half-width of the stick zone and its uncertainty [length].
 
-    slip  (k, dim - 1) of the step that led to the reactions [length], if known
-    The slack counts towards the direction in which the nearest slipping node slips. Where contact ends at a corner, the
-    pressure is singular: the slack relative to its bound stays smooth but not straight, so that near values serve best, and
-    the mean of what the slack inside and the slip outside read, which is as uncertain as they differ. Small steps of a path
-    slip otherwise: their reading, off by more than an element, is left out.
+    The slack of the friction bound counts towards the direction in which the nearest slipping node slips. Where contact ends
+    at a corner, the pressure is singular: the slack relative to its bound stays smooth but not straight. The values nearest
+    to the edge then serve best, and the edge is the mean of what the slack inside and the slip outside read; it is as
+    uncertain as they differ. A reading that is off by more than an element is left out, which happens to the slip of small
+    steps of a load path.
+
+    Parameters
+    ----------
+    reactions : (k, dim) nodal forces, normal first [force]
+    slip : (k, dim - 1) tangential motion of the step that led to the reactions [length], if known
     """
-    touching, inside = pressed(reactions), stuck(reactions, problem.mu)
-    found, edge = list[float](), _Edge.of(problem, inside)
-    if edge is not None and np.any(touching & ~inside):
-        bound, r_t = problem.mu * np.abs(reactions[:, 0]), reactions[:, 1:]
-        slack = bound - np.sum(r_t * _directions(problem, r_t, touching & ~inside), axis=1)
-        if not touching.all():
-            read = edge.inner(slack / problem.areas, SMOOTH)
-            found = [] if read is None else [edge.clip(read)]
-        else:
-            reads = [edge.inner(slack / np.where(bound > 0, bound, 1.0), NEAR)]
-            if slip is not None:
-                reads.append(edge.outer(np.linalg.norm(slip, axis=1), NEAR))
-            found = [read for read in reads if read is not None and edge.clip(read) == read]
-    width = float(np.mean(found)) if found else stick_half_width(scene, problem, reactions)
-    return min(width, contact_edge(scene, problem, reactions)), float(np.ptp(found)) / 2 if found else 0.0
+    status = contact_status(problem, reactions)
+    contact = contact_edge(scene, problem, reactions)
+    if not status.stick.any():
+        return 0.0, 0.0
+    if not status.slip.any():
+        return contact, 0.0
+    bound, r_t = problem.law.bound(reactions[:, 0]), reactions[:, 1:]
+    slack = bound - np.sum(r_t * _directions(problem, r_t, status.slip), axis=1)
+    relative = slack / np.where(bound > 0, bound, 1.0)
+    distance = None if slip is None else np.linalg.norm(slip, axis=1)
+
+    def read(end: End) -> list[float]:
+        if status.open[end.contact].any():  # contact ends by itself beyond the stick zone
+            edge = end.inner(slack / problem.areas, SMOOTH)
+            return [] if edge is None else [end.clip(edge)]
+        edges = [end.inner(relative, NEAR)]
+        if distance is not None:
+            edges.append(end.outer(distance, NEAR))
+        return [edge for edge in edges if edge is not None and end.clip(edge) == edge]
+
+    width, uncertainty = _half_width(scene, problem, status.stick, problem.areas, read)
+    return min(width, contact), uncertainty
+
+
+def _half_width(
+    scene: Scene, problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray, read: Reader
+) -> tuple[float, float]:
+    """Half-width of the zone of the contacts `inside`, from the readings of its ends, and its uncertainty [length].
+
+    weights  (k,) by which the centre of a zone on a surface is averaged
+    """
+    counted = equivalent_half_width(scene, float(problem.areas[inside].sum()))
+    if inside.all() or not inside.any():
+        return counted, 0.0
+    if scene.kind == "axisymmetric" and not problem.chart.mirrored[0]:
+        return counted, 0.0  # a ring: its chart does not tell the distance from the axis
+    found = [patch.measure(read) for patch in patches_of(problem, inside, weights)]
+    if not found or any(patch is None for patch in found):
+        return counted, 0.0
+    ends = [patch for patch in found if patch is not None]
+    uncertainty = sum(patch.copies * patch.uncertainty for patch in ends)
+    if scene.kind == "axisymmetric":  # a ring between two distances from the axis, or a disc
+        squares = (abs(patch.last**2 - (patch.first**2 if patch.first > 0 or patch.last < 0 else 0)) for patch in ends)
+        return float(np.sqrt(sum(squares))), uncertainty
+    return sum(patch.copies * (patch.last - patch.first) / 2 for patch in ends), uncertainty
+
+
+def _zero_of_parabola(end: End, pressure: np.ndarray, areas: np.ndarray, share: float) -> float | None:
+    """Where a parabola through p^2 over x^2, from that share of the half-width on, is first zero; None if it is not.
+
+    With friction between dissimilar bodies p^2 is not straight over x^2, hence the parabola. Three nodes leave a line.
+    """
+    x, inside = end.distance, end.inside
+    last = x[inside].max()
+    innermost = np.sort(x[inside])[-OUTER:].min()
+    fitted = inside & (x >= share * last) & (x < innermost)
+    nodes = len(np.unique(x[fitted]))
+    if nodes < 3:
+        return None
+    square, weights = pressure[end.contact[fitted]] ** 2, np.sqrt(areas[end.contact[fitted]])
+    place = (x[fitted] / last) ** 2
+    fit = np.polyfit(place, square / square.max(), min(nodes - 2, 2), w=weights / weights.max())
+    zeros = np.roots(fit)
+    beyond = zeros.real[np.isreal(zeros) & (zeros.real > place.max())]
+    return float(last * np.sqrt(beyond.min())) if len(beyond) else None
 
 
 def _directions(problem: InterfaceProblem, r_t: np.ndarray, slipping: np.ndarray) -> np.ndarray:
@@ -68,64 +157,3 @@ def _directions(problem: InterfaceProblem, r_t: np.ndarray, slipping: np.ndarray
     x = problem.coordinates.T
     nearest = r_t[np.flatnonzero(slipping)[KDTree(x[slipping]).query(x)[1]]]
     return np.asarray(nearest / np.maximum(np.linalg.norm(nearest, axis=1), 1e-300)[:, None])
-
-
-@dataclass(frozen=True, eq=False)
-class _Edge:
-    """Between the last distance inside a zone about the centre and the first outside; step: of the nodes next to it."""
-
-    distance: np.ndarray
-    inside: np.ndarray
-    step: float
-
-    @classmethod
-    def of(cls, problem: InterfaceProblem, inside: np.ndarray) -> _Edge | None:
-        """None where the nodes inside are none, all, or no zone about the centre."""
-        if inside.all() or not inside.any():
-            return None
-        distance = np.linalg.norm(problem.coordinates[: problem.dim - 1], axis=0)
-        step = _spacing(problem.coordinates, distance, distance[inside].max())
-        zone = abs(distance[~inside].min() - distance[inside].max()) <= 1.5 * step
-        return cls(distance, inside, step) if zone else None
-
-    def inner(self, value: np.ndarray, window: Window) -> float | None:
-        """Where value^2, a line in distance^2 through values inside, is zero."""
-        depth = self.distance[self.inside].max() - self.distance
-        square = self._zero(self.distance**2, value**2, self.inside, depth, window)
-        return None if square is None or square <= 0 else float(np.sqrt(square))
-
-    def outer(self, value: np.ndarray, window: Window) -> float | None:
-        """Where value^(2/3), a line in the distance through values outside, is zero."""
-        depth = self.distance - self.distance[~self.inside].min()
-        return self._zero(self.distance, value ** (2 / 3), ~self.inside, depth, window)
-
-    def clip(self, edge: float) -> float:
-        """To less than an element from where the nodes say it is."""
-        last = self.distance[self.inside].max()
-        return float(np.clip(edge, last - self.step / 2, last + 1.5 * self.step))
-
-    def _zero(self, x: np.ndarray, y: np.ndarray, side: np.ndarray, depth: np.ndarray, window: Window) -> float | None:
-        """Of a line through y(x) at the rings in the window on one side; None if it does not fall towards the edge."""
-        rings = _rings(depth[side], self.step, sum(window))
-        skip = max(0, min(window[0], len(rings) - window[1]))
-        fitted = rings[skip : skip + window[1]]
-        near = side & (depth >= fitted[0] - 1e-5 * self.step) & (depth <= fitted[-1] + 1e-5 * self.step)
-        if np.ptp(depth[near]) <= 1e-5 * self.step:
-            return None
-        slope, height = np.polyfit(x[near], y[near], 1)
-        falls = (slope < 0) == bool(self.inside[near][0])
-        return float(-height / slope) if slope and falls else None
-
-
-def _spacing(coordinates: np.ndarray, distance: np.ndarray, edge: float) -> float:
-    """Distance between neighbouring nodes next to the edge."""
-    near = np.argsort(np.abs(distance - edge))[:5]
-    return float(np.median(KDTree(coordinates.T).query(coordinates.T[near], k=2)[0][:, 1]))
-
-
-def _rings(depth: np.ndarray, step: float, count: int) -> list[float]:
-    """The least depths, at most `count`, each about a step or more beyond the one before."""
-    rings = [float(depth.min())]
-    while len(rings) < count and np.any(beyond := depth > rings[-1] + 0.75 * step):
-        rings.append(float(depth[beyond].min()))
-    return rings

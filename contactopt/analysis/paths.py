@@ -17,8 +17,6 @@ size, zero where neither contact nor the direction and bound of slip change.
 from __future__ import annotations
 
 import csv
-import os
-import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -29,8 +27,9 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.edges import contact_edge, stick_edge
-from contactopt.analysis.zone import pressed, stuck
+from contactopt.analysis.status import contact_status
 from contactopt.errors import InputError
+from contactopt.files import whole_folder
 from contactopt.interface.reduction import Reduction, reduce_bodies
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.scenes.scene import Scene
@@ -114,23 +113,19 @@ class PathResult:
 
     def write(self, out: str | Path) -> None:
         """history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and displacements (n, k, dim)."""
-        out = Path(out)
-        out.mkdir(parents=True, exist_ok=True)
         problem = self.reduction.problem
-        with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=out) as staging:
-            with open(Path(staging) / "history.csv", "w", newline="") as file:
+        with whole_folder(out) as staging:
+            with open(staging / "history.csv", "w", newline="") as file:
                 rows = csv.writer(file)
                 rows.writerow(self.history)
                 rows.writerows(zip(*self.history.values()))
             np.savez(
-                Path(staging) / "path.npz",
+                staging / "path.npz",
                 coordinates=problem.coordinates,
                 areas=problem.areas,
                 reactions=[state.solution.reactions for state in self.states],
                 displacements=[state.displacements for state in self.states],
             )
-            for file_path in Path(staging).iterdir():
-                os.replace(file_path, out / file_path.name)
 
 
 def follow(
@@ -218,7 +213,7 @@ def _step(
 
 def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
     r = state.solution.reactions
-    touching, sticking = pressed(r), stuck(r, problem.mu)
+    status = contact_status(problem, r)
     return {
         "normal_force": float(r[:, 0].sum()),
         "shear_force": -float(r[:, 1].sum()),
@@ -226,9 +221,9 @@ def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
         "shift": float(state.apart[1]),
         "contact_half_width": contact_edge(state.scene, problem, r),
         "stick_half_width": stick_edge(state.scene, problem, r, state.slip)[0],
-        "contact_nodes": int(touching.sum()),
-        "stick_nodes": int(sticking.sum()),
-        "slip_nodes": int((touching & ~sticking).sum()),
+        "contact_nodes": int(status.touching.sum()),
+        "stick_nodes": int(status.stick.sum()),
+        "slip_nodes": int(status.slip.sum()),
         "elastic_energy": state.elastic,
         "external_work": state.external,
         "friction_work": state.friction,

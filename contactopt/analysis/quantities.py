@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactopt.analysis.constants import WINDOW
+from contactopt.analysis.edges import contact_edge, stick_edge
+from contactopt.analysis.status import contact_status
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from contactopt.interface.reduction import Reduction
-
-WINDOW = 0.5  # of the distance from the largest pressure to the edge: where p^2 is fitted
 
 
 def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
@@ -43,24 +43,19 @@ def peak_pressure(reduction: Reduction, solution: Solution) -> float:
     axisymmetric mesh the nodal value is some 1 % low, since the strain u_r / r is poorly resolved there, on a ring
     whose area counts for nothing. At the rim of the contact surface, and where the window has no room, the nodal value.
     """
-    from contactopt.analysis.zone import pressed
-
     problem = reduction.problem
-    x, node = _surface(reduction.scene, problem)
+    local, node, top = _around_the_peak(problem, solution)
     pressure = solution.reactions[:, 0] / problem.areas
-    top = int(np.argmax(pressure))
-    middle = x[:, np.flatnonzero(node == top)[0]]
-    distance = np.linalg.norm(x - middle[:, None], axis=0)
-    outside = ~pressed(solution.reactions)[node]
+    distance = np.linalg.norm(local, axis=0)
+    outside = contact_status(problem, solution.reactions).open[node]
     edge = distance[outside].min() if outside.any() else distance.max()
     near = distance < WINDOW * edge
     if at_rim(reduction, solution) or len(np.unique(distance[near])) < 3:
         return float(pressure[top])
-    degree = 4 if near.sum() >= 5 ** len(x) + 2 else 2
-    powers = np.stack(np.meshgrid(*[np.arange(degree + 1)] * len(x), indexing="ij")).reshape(len(x), -1)
+    degree = 4 if near.sum() >= 5 ** len(local) + 2 else 2
+    powers = np.stack(np.meshgrid(*[np.arange(degree + 1)] * len(local), indexing="ij")).reshape(len(local), -1)
     powers = powers[:, powers.sum(axis=0) <= degree]
-    local = (x[:, near] - middle[:, None]) / (WINDOW * edge)
-    terms = np.prod(local[:, :, None] ** powers[:, None], axis=0)
+    terms = np.prod((local[:, near] / (WINDOW * edge))[:, :, None] ** powers[:, None], axis=0)
     weights = np.sqrt(problem.areas[node[near]])[:, None]
     fit = np.linalg.lstsq(terms * weights, pressure[node[near], None] ** 2 * weights, rcond=None)[0]
     inner = distance[near] <= WINDOW / 2 * edge
@@ -72,64 +67,40 @@ def at_rim(reduction: Reduction, solution: Solution) -> bool:
 
     A node inside has neighbours in all directions.
     """
-    problem = reduction.problem
-    x, node = _surface(reduction.scene, problem)
-    top = int(np.argmax(solution.reactions[:, 0] / problem.areas))
-    offsets = x - x[:, [np.flatnonzero(node == top)[0]]]
+    offsets = _around_the_peak(reduction.problem, solution)[0]
     distance = np.linalg.norm(offsets, axis=0)
-    if len(x) == 1:
+    if len(offsets) == 1:
         return bool((offsets > 0).any() != (offsets < 0).any())
     near = offsets[:, np.argsort(distance)[1:9]]
     angles = np.sort(np.arctan2(near[1], near[0]))
     return bool(np.max(np.diff(np.append(angles, angles[0] + 2 * np.pi))) > 0.8 * np.pi)
 
 
-def _surface(scene: Scene, problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (dim - 1, m) on the contact surface with mirror images, and the contact node of each (m,)."""
-    x, node = problem.coordinates[: problem.dim - 1], np.arange(problem.contacts)
-    if scene.copies == 1 and scene.kind != "axisymmetric":
-        return x, node
-    near = 1e-9 * np.abs(x).max()
-    for axis in range(len(x)):
-        if np.abs(x[axis]).min() <= near and (np.all(x[axis] >= -near) or np.all(x[axis] <= near)):
-            other = np.abs(x[axis]) > near
-            image = x[:, other] * np.where(np.arange(len(x)) == axis, -1.0, 1.0)[:, None]
-            x, node = np.hstack([x, image]), np.append(node, node[other])
-    return x, node
+def _around_the_peak(problem: InterfaceProblem, solution: Solution) -> tuple[np.ndarray, np.ndarray, int]:
+    """Places (dim - 1, m) on the whole surface relative to the node of the largest pressure, the node of each, and that node."""
+    top = int(np.argmax(solution.reactions[:, 0] / problem.areas))
+    if problem.chart.closed:
+        return problem.chart.offsets(top), np.arange(problem.contacts), top
+    places, node = problem.chart.images()
+    return places - problem.chart.places[:, [top]], node, top
 
 
 def width(reduction: Reduction, solution: Solution) -> float:
-    """Half-width of the contact zone [length].
+    """Half-width of the contact zone [length], contact_edge()."""
+    return contact_edge(reduction.scene, reduction.problem, solution.reactions)
 
-    In the plane, where contact ends by itself: the zero of a line through p^2 against x^2, from half of the half-width on, without
-    the last two nodes, whose values carry the error of the edge. Otherwise contact_edge().
-    """
-    from contactopt.analysis.edges import contact_edge
-    from contactopt.analysis.zone import pressed
 
-    problem, r = reduction.problem, solution.reactions
-    inside, distance = pressed(r), np.abs(problem.coordinates[0])
-    if problem.dim == 2 and inside.any() and not inside.all() and distance[~inside].min() > distance[inside].max():
-        last = distance[inside].max()
-        rough = np.sort(distance[inside])[-2:].min()
-        fitted = inside & (distance >= WINDOW * last) & (distance < rough)
-        if len(np.unique(distance[fitted])) > 2:
-            square = (r[fitted, 0] / problem.areas[fitted]) ** 2
-            slope, height = np.polyfit(distance[fitted] ** 2, square, 1, w=np.sqrt(problem.areas[fitted]))
-            if slope < 0 < height:
-                return float(np.sqrt(-height / slope))
-    return contact_edge(reduction.scene, problem, r)
+def stick_width(reduction: Reduction, solution: Solution) -> tuple[float, float]:
+    """Half-width of the stick zone and its uncertainty [length], stick_edge() with the slip of this solution."""
+    problem = reduction.problem
+    slip = problem.displacements(solution.reactions, solution.multipliers)[:, 1:]
+    return stick_edge(reduction.scene, problem, solution.reactions, slip)
 
 
 def stick_ratio(reduction: Reduction, solution: Solution) -> tuple[float, float]:
     """Half-width of the stick zone over that of contact [-], and its uncertainty: read between nodes."""
-    from contactopt.analysis.edges import contact_edge, stick_edge
-
-    problem = reduction.problem
-    given = reduction.scene, problem, solution.reactions
-    edge = contact_edge(*given)
-    slip = problem.displacements(solution.reactions, solution.multipliers)[:, 1:]
-    stick, uncertainty = stick_edge(*given, slip)
+    edge = width(reduction, solution)
+    stick, uncertainty = stick_width(reduction, solution)
     return (stick / edge, uncertainty / edge) if edge > 0 else (0.0, 0.0)
 
 

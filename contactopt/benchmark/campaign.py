@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -11,11 +10,17 @@ from contextlib import closing
 from pathlib import Path
 
 from contactopt.benchmark.experiment import Experiment, NothingToRun, read_experiment
+from contactopt.benchmark.files import subfolder, told
 from contactopt.benchmark.measure import Task
 from contactopt.benchmark.pool import run_locally, run_on_cluster
-from contactopt.benchmark.report import build, publish
+from contactopt.benchmark.report import build, publish, read_layout
 from contactopt.benchmark.store import Store, load, require, save
+from contactopt.checks import check_count
 from contactopt.errors import InputError
+from contactopt.files import remove_files, replace_file
+
+MOST_JOBS = 1000
+WRITTEN = ("rows.jsonl", "rows.parquet", "experiment.toml")  # by a campaign
 
 
 def run_campaign(
@@ -39,21 +44,21 @@ def run_campaign(
     require("pandas", "pyarrow", "tqdm")
     if not isinstance(experiment, Experiment):
         experiment = read_experiment(experiment)
-    if jobs is not None and jobs < 1:
-        raise InputError(f"jobs must be at least 1; got {jobs}.")
-    folder = Path(out) if out is not None else Path("out/bench") / experiment.name
+    if jobs is not None:
+        check_count("jobs", jobs)
+        if jobs > MOST_JOBS:
+            raise InputError(f"jobs must be at most {MOST_JOBS}; got {jobs}.")
+    folder = Path(out) if out is not None else subfolder(Path("out/bench"), experiment.name)
     runs = experiment.runs(filters)
     if not runs:
         raise InputError("no run matches the filters.")
     e = experiment
     limits = (e.time_limit, e.memory_limit, e.max_iterations, e.seed, e.diagnose)
-    try:
-        store = Store(folder, resume)
-    except OSError as error:
-        raise InputError(f"cannot write into '{folder}': {error.strerror}.") from error
-    with store:
+    with Store(folder, resume) as store:
         if experiment.path.is_file():
-            shutil.copy(experiment.path, folder / "experiment.toml")
+            text = experiment.path.read_bytes()
+            with told(folder, "choose another --out"):
+                replace_file(folder / "experiment.toml", lambda file: file.write_bytes(text))
         finished = store.finished()
         tasks = [Task(run, experiment.name, experiment.plugins, *limits) for run in runs if run.key not in finished]
         rows = run_on_cluster(tasks, scheduler) if scheduler else run_locally(tasks, jobs or os.cpu_count() or 1)
@@ -88,6 +93,13 @@ def run_reports(
         raise InputError(f"unknown {wrong}.")
     work = Path("out") / (version or "bench")
     target = work / "reports" if version == "quick" else Path(reports)
+    if version:  # complain before anything is run or removed
+        layouts = [read_layout(path) for path in paths]
+        for layout in layouts:
+            subfolder(target, layout.name)
+        twice = [name for name, n in Counter(layout.name for layout in layouts).items() if n > 1]
+        if twice:
+            raise InputError(f"two experiments are called {twice[0]!r}; their results would be mixed, rename one.")
     for path in paths if version else ():
         if names and path.stem not in names:
             continue
@@ -96,8 +108,9 @@ def run_reports(
         except NothingToRun as error:
             print(f"left out: {error}", file=sys.stderr)
             continue
-        folder = work / experiment.name
-        shutil.rmtree(folder, ignore_errors=True)
+        folder = subfolder(work, experiment.name)
+        with told(folder):
+            remove_files(folder, WRITTEN)
         publish(path, run_campaign(experiment, folder, jobs=jobs, quiet=quiet), target)
     return build(paths, target)
 
@@ -106,6 +119,7 @@ def _execute(experiment, store, tasks, total, rows, quiet) -> None:  # type: ign
     from tqdm import tqdm
 
     failed: Counter[str] = Counter()
+    waiting = {task.run.key for task in tasks}
     with (
         closing(rows),
         tqdm(
@@ -113,8 +127,15 @@ def _execute(experiment, store, tasks, total, rows, quiet) -> None:  # type: ign
         ) as bar,
     ):
         for row in rows:
+            if row["key"] not in waiting:
+                raise InputError(f"a row arrived that was not asked for, or twice: {row['problem']}, {row['method']}.")
+            waiting.remove(row["key"])
             store.append(row)
             if not row["success"]:
                 failed[row["status"]] += 1
                 bar.set_postfix_str(", ".join(f"{n} {status}" for status, n in failed.most_common()), refresh=False)
             bar.update()
+    if waiting:
+        raise InputError(
+            f"{len(waiting)} of {len(tasks)} runs left no row; finished runs are kept, go on with --resume."
+        )

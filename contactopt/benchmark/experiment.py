@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections import Counter
@@ -14,11 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.benchmark.plugins import load_plugins
-from contactopt.benchmark.problems import KINDS, ProblemSpec, named
+from contactopt.benchmark.catalogue import Catalogue, read_catalogue
+from contactopt.benchmark.problems import FAMILIES, KINDS, ProblemSpec, named
 from contactopt.benchmark.runs import SETTINGS, STARTS, MethodSpec, Run
-from contactopt.checks import check_number
+from contactopt.checks import check_name, check_number, short
 from contactopt.errors import InputError
+
+MOST_RUNS = 200_000  # of one experiment
+BOUNDS = {"time_limit": (0.0, 1e6), "memory_limit": (0.2, 1e4)}  # s; GB: less than the least holds no NumPy and SciPy
+MOST = {"repeats": MOST_RUNS, "max_iterations": 10**9, "seed": 2**32 - 1}  # NumPy's generator takes no larger seed
+LARGEST = 2**63  # of whole numbers, as in TOML
 
 
 class NothingToRun(InputError):
@@ -120,11 +126,12 @@ class _Reader:
                 raise self.located(f"an experiment needs '{key}'", key)
         data = {key: tuple(value) if isinstance(value, list) else value for key, value in data.items()}
         self.scalars(data)
+        self.count(data)
         paths = tuple(str((self.path.parent / plugin).resolve()) for plugin in data.get("plugins", ()))
-        self.guard("plugins", load_plugins, paths)
+        catalogue = self.catalogue(paths, data["methods"])
         skipped: list[str] = []
-        problems = [p for i, entry in enumerate(data["problems"]) for p in self.problems(i, entry, skipped)]
-        methods = [m for i, entry in enumerate(data["methods"]) for m in self.methods(i, entry, skipped)]
+        problems = [p for i, e in enumerate(data["problems"]) for p in self.problems(i, e, catalogue, skipped)]
+        methods = [m for i, e in enumerate(data["methods"]) for m in self.methods(i, e, catalogue, skipped)]
         for title, specs in (("problems", problems), ("methods", methods)):
             twice = [label for label, n in Counter(spec.label for spec in specs).items() if n > 1]
             if twice:
@@ -143,17 +150,21 @@ class _Reader:
                 raise self.located(f"'{key}' must be a {'table' if kind is dict else 'text'}", key)
         if not re.fullmatch(r"[\w.-]+", data["name"]):
             raise self.located("'name' becomes a directory: letters, digits, '-', '_' and '.' only", "name")
+        self.guard("name", check_name, "'name'", data["name"])
         for key in ("plugins", "settings", "starts", "problems", "methods", "figures", "columns"):
             if not isinstance(data.get(key, ()), tuple):
                 raise self.located(f"'{key}' must be a list", key)
-        for key in ("repeats", "max_iterations", "seed"):
-            value = data.get(key, 1)
-            if not isinstance(value, int) or isinstance(value, bool) or value < (key != "seed"):
-                raise self.located(f"'{key}' must be a whole number; got {value!r}", key)
+        for key in ("plugins", "columns"):
+            if not all(isinstance(value, str) for value in data.get(key, ())):
+                raise self.located(f"'{key}' must be a list of texts", key)
+        for key, most in MOST.items():
+            value, least = data.get(key, 1), int(key != "seed")
+            if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+                raise self.located(f"'{key}' must be a whole number from {least} to {most}; got {short(value)}", key)
         if not isinstance(data.get("diagnose", False), bool):
             raise self.located("'diagnose' must be true or false", "diagnose")
-        for key in ("time_limit", "memory_limit"):
-            self.guard(key, check_number, f"'{key}'", data.get(key, 1.0), 0.0)
+        for key, (low, high) in BOUNDS.items():
+            self.guard(key, check_number, f"'{key}'", data.get(key, 1.0), low, high)
         for setting in data.get("settings", ()):
             if isinstance(setting, str) and setting not in SETTINGS:
                 raise self.located(
@@ -164,8 +175,42 @@ class _Reader:
         for start in data.get("starts", ()):
             if start not in STARTS:
                 raise self.located(f"unknown start {start!r}; choose from {', '.join(STARTS)}", "starts")
+        for key in ("settings", "starts"):
+            twice = [text for text, n in Counter(map(str, data.get(key, ()))).items() if n > 1]
+            if twice:
+                raise self.located(f"'{key}' holds {twice[0]} twice", key)
 
-    def problems(self, index: int, entry: Any, skipped: list[str]) -> Iterator[ProblemSpec]:
+    def count(self, data: Mapping[str, Any]) -> None:
+        """Refuse an experiment of too many runs by their number, before anything is expanded, built or run."""
+        number = data.get("repeats", 1)
+        for key in ("settings", "starts"):
+            number *= len(data.get(key, ("default",)))
+        for table in ("problems", "methods"):
+            entries = [entry for entry in data[table] if isinstance(entry, dict)]
+            number *= max(1, sum(math.prod(map(size_of, entry.values())) for entry in entries))
+        if number > MOST_RUNS:
+            raise self.located(
+                f"these are {number} runs, more than {MOST_RUNS} in one experiment; split it, or take fewer repeats "
+                "or values",
+                "repeats",
+            )
+
+    def catalogue(self, paths: tuple[str, ...], methods: Sequence[Any]) -> Catalogue:
+        """What the plug-ins declare, and installed packages for the methods named."""
+        given = [entry.get("method") for entry in methods if isinstance(entry, dict)]
+        names = [name for names in given for name in (names if isinstance(names, list) else [names])]
+        try:
+            found = read_catalogue(paths, [name for name in names if isinstance(name, str)])
+        except InputError as error:
+            raise self.located(str(error), "plugins") from error
+        for name in found.problems:
+            if name in FAMILIES:
+                raise self.located(
+                    f"plug-in problem {name!r} has the name of a family of contactopt; rename it", "plugins"
+                )
+        return found
+
+    def problems(self, index: int, entry: Any, catalogue: Catalogue, skipped: list[str]) -> Iterator[ProblemSpec]:
         kinds = [kind for kind in KINDS if isinstance(entry, dict) and kind in entry]
         if len(kinds) != 1:
             raise self.located(f"a problem needs one of {', '.join(KINDS)}", "problems", index)
@@ -173,20 +218,20 @@ class _Reader:
             try:
                 found = named(kinds[0], name, parameters, self.path.parent)
                 for spec in found:
-                    spec.check()
-            except InputError as error:
+                    spec.check(catalogue.problems)
+            except (ValueError, TypeError, ArithmeticError) as error:  # InputError is a ValueError
                 self.refuse(error, "problems", index, entry, kinds[0], skipped)
             else:
                 yield from found
 
-    def methods(self, index: int, entry: Any, skipped: list[str]) -> Iterator[MethodSpec]:
+    def methods(self, index: int, entry: Any, catalogue: Catalogue, skipped: list[str]) -> Iterator[MethodSpec]:
         if not isinstance(entry, dict) or "method" not in entry:
             raise self.located("a method needs the key 'method'", "methods", index)
         for name, settings in self.expand("methods", index, entry, "method", skipped):
-            spec = MethodSpec(name, settings)
+            spec = MethodSpec(name, settings, catalogue.methods.get(name))
             try:
                 spec.check()
-            except InputError as error:
+            except (ValueError, TypeError, ArithmeticError) as error:
                 self.refuse(error, "methods", index, entry, "method", skipped)
             else:
                 yield spec
@@ -209,7 +254,7 @@ class _Reader:
             yield name, dict(zip(rest, values))
 
     def refuse(
-        self, error: InputError, table: str, index: int, entry: Mapping[str, Any], kind: str, skipped: list[str]
+        self, error: Exception, table: str, index: int, entry: Mapping[str, Any], kind: str, skipped: list[str]
     ) -> None:
         if not entry.get("optional"):
             words = {
@@ -246,20 +291,32 @@ class _Reader:
         return InputError(f"{where}: {message.rstrip('.')}.")
 
 
+def size_of(value: Any) -> int:
+    """How many values a list or a range stands for, without making them."""
+    if isinstance(value, dict):
+        steps = value.get("steps")
+        return steps if isinstance(steps, int) and steps > 0 else 1
+    return len(value) if isinstance(value, list) else 1
+
+
 def values_of(name: str, value: Any) -> list[Any]:
     """One value, a list of them, or a range {from, to, steps, scale = "linear" or "log"}."""
-    if isinstance(value, list):
-        if not value:
-            raise InputError(f"the list '{name}' is empty")
-        return value
+    if isinstance(value, list) and not value:
+        raise InputError(f"the list '{name}' is empty")
     if not isinstance(value, dict):
-        return [value]
+        values = value if isinstance(value, list) else [value]
+        for one in values:
+            if not isinstance(one, str | int | float) or (isinstance(one, int) and abs(one) >= LARGEST):
+                raise InputError(f"a value of '{name}' must be a text, a number, true or false; got {short(one)}")
+        return values
     if not {"from", "to", "steps"} <= set(value) or set(value) - {"from", "to", "steps", "scale"}:
         raise InputError(f"the range '{name}' needs from, to, steps, and may have scale = \"log\"")
     scales: dict[str, Callable[..., np.ndarray]] = {"linear": np.linspace, "log": np.geomspace}
     spaced = scales.get(value.get("scale", "linear"))
     if spaced is None or not isinstance(value["steps"], int) or value["steps"] < 1:
         raise InputError(f'the range \'{name}\' needs whole steps >= 1 and scale "linear" or "log"')
+    for key in ("from", "to"):
+        check_number(f"'{key}' of the range '{name}'", value[key])
     if spaced is np.geomspace and not (value["from"] > 0 and value["to"] > 0):
         raise InputError(f"the logarithmic range '{name}' needs bounds above 0")
     numbers = [float(f"{x:.6g}") for x in spaced(value["from"], value["to"], value["steps"])]

@@ -1,14 +1,11 @@
-"""One run measured: the method called, its answer certified, the row written."""
+"""One run judged: its row, the answer's certificate. Runs in the campaign's process, where no plug-in is loaded."""
 
 from __future__ import annotations
 
-import inspect
 import json
 import os
 import platform
-import random
-import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -16,24 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.benchmark.runs import PASSED, Run
-from contactopt.benchmark.store import SCHEMA, pack
-from contactopt.errors import BackendError, InputError
+from contactopt.benchmark.process import one_line
+from contactopt.benchmark.runs import Run
+from contactopt.benchmark.store import SCHEMA, STATUSES, pack
+from contactopt.benchmark.wire import ForeignMessage
+from contactopt.errors import InputError
 from contactopt.problem import (
     InterfaceProblem,
-    Solution,
     Status,
-    balance_residual,
-    fit_multipliers,
     natural_map_residual,
 )
-from contactopt.problem.certificate import balanced_step
-from contactopt.problem.cones import coulomb_cone
-from contactopt.solving.driver import solve
-from contactopt.solving.methods import find_method
+from contactopt.problem.laws.associated import Associated
 
-POINTS = 100  # of a history
-MB = 1e6
+ENDS = ("refused", "error", "backend_failed", "out_of_memory", "not_built")  # what a run without an answer may say
+MEASURED = ("call_seconds", "cpu_seconds", "peak_mb", "base_mb")  # columns that the worker fills
 
 
 @dataclass(frozen=True)
@@ -52,17 +45,58 @@ class Task:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
-    """What a method returned, in one form for all; `status` is its own word."""
+class Answer:
+    """What a worker says of a run. `status` is the method's own word; `reactions` None where there is no answer."""
 
-    reactions: np.ndarray
-    multipliers: np.ndarray | None
     status: str
-    message: str = ""
-    label: str = ""
-    iterations: float = np.nan
-    seconds: float = np.nan
-    history: tuple[dict[str, float], ...] = ()
+    message: str
+    measured: dict[str, float]
+    reactions: np.ndarray | None
+    multipliers: np.ndarray | None
+    label: str
+    iterations: float
+    seconds: float
+    history: tuple[list[float], list[float], list[int]] | None
+
+    @classmethod
+    def of(cls, content: Any, problem: InterfaceProblem) -> Answer:
+        """From a message that code of the user may have written; ForeignMessage if anything in it does not fit."""
+        try:
+            reactions, multipliers = (_floats(content[name]) for name in ("reactions", "multipliers"))
+            answer = cls(
+                str(content["status"]),
+                one_line(str(content["message"])),
+                {name: float(content["measured"][name]) for name in MEASURED if name in content["measured"]},
+                reactions if reactions is None else reactions.reshape(problem.q.shape),
+                multipliers if multipliers is None else multipliers.reshape(problem.s.shape),
+                str(content["label"]),
+                float(content["iterations"]),
+                float(content["seconds"]),
+                _history(content["history"]),
+            )
+        except (LookupError, TypeError, ValueError, OverflowError) as error:
+            raise ForeignMessage("an answer of another form") from error
+        known = ENDS if answer.reactions is None else STATUSES
+        if answer.status not in known or min(answer.seconds, *answer.measured.values()) < 0:
+            raise ForeignMessage("an answer that makes no sense")
+        return answer
+
+
+def _floats(value: Any) -> np.ndarray | None:
+    if value is None:
+        return None
+    if not isinstance(value, np.ndarray) or value.dtype != np.dtype(float):
+        raise TypeError("an array of numbers is needed")
+    return value
+
+
+def _history(value: Any) -> tuple[list[float], list[float], list[int]] | None:
+    if value is None:
+        return None
+    residuals, seconds, iterations = value
+    if not len(residuals) == len(seconds) == len(iterations):
+        raise ValueError("columns of one length are needed")
+    return [float(x) for x in residuals], [float(x) for x in seconds], [int(x) for x in iterations]
 
 
 def blank(task: Task) -> dict[str, Any]:
@@ -128,71 +162,23 @@ def machine() -> str:
     return f"{model}, {os.cpu_count()} cores, {platform.system()}"
 
 
-def measure(task: Task, problem: InterfaceProblem, start: Solution | None) -> dict[str, Any]:
-    """The part of the row that comes from running the method and certifying its answer."""
-    random.seed(task.seed)
-    np.random.seed(task.seed)  # noqa: NPY002 (a plug-in may use the global generator)
-    out: dict[str, Any] = {"base_mb": reset_peak()}
-    wall, cpu = time.perf_counter(), time.process_time()
-    try:
-        outcome: Outcome | Exception = call(task, problem, start)
-    except (Exception, SystemExit) as error:
-        outcome = error if isinstance(error, Exception) else RuntimeError(f"it called exit({error})")
-    out["call_seconds"], out["cpu_seconds"] = time.perf_counter() - wall, time.process_time() - cpu
-    out["solve_seconds"], out["peak_mb"] = out["call_seconds"], peak()
+def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, Any]:
+    """The part of the row that follows from an answer: certificate and status.
+
+    The method's own word counts only where it admits failure.
+    """
+    out: dict[str, Any] = {"message": answer.message, **answer.measured}
     out["time"] = datetime.now(UTC).isoformat(timespec="seconds")
-    if isinstance(outcome, Outcome):
-        return out | judge(task, problem, outcome, out["call_seconds"])
-    kinds = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "backend_failed"}
-    status = next((word for kind, word in kinds.items() if isinstance(outcome, kind)), "error")
-    return out | {"status": status, "message": short(outcome)}
-
-
-def call(task: Task, problem: InterfaceProblem, start: Solution | None) -> Outcome:
-    """Run the method; its own errors pass through."""
-    spec, tol = task.run.method, None if task.run.setting == "default" else task.run.tolerance
-    plugin = spec.plugin
-    if plugin is None or plugin.iterates:
-        method = find_method(spec.name, **spec.settings) if plugin is None else plugin.make(**spec.settings)
-        settings: dict[str, Any] = {} if tol is None else {"tol": tol}
-        settings |= {"max_iterations": task.max_iterations, "time_limit": task.time_limit, "start": start}
-        s = solve(problem, method, **settings)
-        return Outcome(
-            s.reactions, s.multipliers, s.status.label, s.message, s.method, s.iterations, s.seconds["solve"], s.history
-        )
-    given = {
-        "tol": task.run.tolerance,
-        "time_limit": task.time_limit,
-        "max_iterations": task.max_iterations,
-        "start": start,
-    }
-    wanted = inspect.signature(plugin.make).parameters
-    passed = {name: given[name] for name in PASSED if name in wanted and name not in spec.settings}
-    if tol is None and "tol" in passed and wanted["tol"].default is not inspect.Parameter.empty:
-        del passed["tol"]
-    answer = plugin.make(problem, **passed, **spec.settings)
-    if isinstance(answer, Solution):
-        return Outcome(
-            answer.reactions, answer.multipliers, answer.status.label, answer.message, spec.label, answer.iterations,
-            history=answer.history,
-        )  # fmt: skip
-    reactions, multipliers = answer if isinstance(answer, tuple) else (answer, None)
-    return Outcome(np.asarray(reactions, dtype=float), multipliers, Status.SOLVED.label, label=spec.label)
-
-
-def judge(task: Task, problem: InterfaceProblem, outcome: Outcome, seconds: float) -> dict[str, Any]:
-    """Certificate and status; the method's own word counts only where it admits failure."""
-    r, lam = np.asarray(outcome.reactions, dtype=float), outcome.multipliers
-    if r.shape != problem.q.shape and r.size == problem.q.size:
-        r = r.reshape(problem.q.shape)
-    seconds = seconds if np.isnan(outcome.seconds) else outcome.seconds
-    claimed = outcome.status == Status.SOLVED.label
-    out: dict[str, Any] = {"claimed": claimed, "iterations": outcome.iterations, "solve_seconds": seconds}
-    out |= {"label": outcome.label, "history": thinned(outcome.history), "message": short(outcome.message)}
+    if answer.reactions is None:
+        return out | {"status": answer.status, "solve_seconds": answer.measured.get("call_seconds", np.nan)}
+    r, lam, seconds = answer.reactions, answer.multipliers, answer.seconds
+    claimed = answer.status == Status.SOLVED.label
+    out |= {"claimed": claimed, "iterations": answer.iterations, "solve_seconds": seconds, "label": answer.label}
+    out["history"] = json.dumps(answer.history or [])
     try:
         residual = natural_map_residual(problem, r, lam)
     except InputError as error:
-        return out | {"status": "error", "message": short(error)}
+        return out | {"status": "error", "message": one_line(error)}
     own = residual if task.run.method.law == "coulomb" else associated_residual(problem, r, lam)
     out |= {"residual": residual, "law_residual": own}
     if not np.all(np.isfinite(r)) or (lam is not None and not np.all(np.isfinite(lam))):
@@ -202,53 +188,9 @@ def judge(task: Task, problem: InterfaceProblem, outcome: Outcome, seconds: floa
         if seconds <= task.time_limit:
             return out | {"status": "solved", "success": True}
         return out | {"status": "time_limit", "message": "certified, but after the time limit"}
-    return out | {"status": "false_claim" if claimed else outcome.status}
+    return out | {"status": "false_claim" if claimed else answer.status}
 
 
 def associated_residual(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray | None) -> float:
-    """As natural_map_residual for the associated law: |r - proj_K(r - rho u)| over the same size, and the balance."""
-    if not np.all(np.isfinite(r)):
-        return np.inf
-    lam = fit_multipliers(problem, r) if lam is None else lam
-    w = problem.q + (problem.V @ lam).reshape(r.shape)
-    moved = (problem.Q @ r.ravel()).reshape(r.shape)
-    rho = balanced_step(r, moved, moved + w, w)
-    size = max(np.linalg.norm(r), rho * np.linalg.norm(w), rho * np.linalg.norm(moved + w))
-    gap = np.linalg.norm(r - coulomb_cone(r - rho * (moved + w), problem.mu))
-    return float(max(gap / size if size > 0 else 0.0, balance_residual(problem, r)))
-
-
-def thinned(history: tuple[dict[str, float], ...]) -> str:
-    """JSON [[residuals], [seconds]] with at most POINTS entries, the last included; [iterations] third."""
-    if not history:
-        return "[]"
-    index = np.unique(np.geomspace(1, len(history), POINTS).astype(int)) - 1
-    columns = [[float(f"{history[i].get(key, np.nan):.3g}") for i in index] for key in ("residual", "seconds")]
-    return json.dumps([*columns, [int(i) + 1 for i in index]])
-
-
-def short(error: object) -> str:
-    text = str(error) if isinstance(error, str | InputError) else f"{type(error).__name__}: {error}"
-    return " ".join(text.split())[:200]
-
-
-def reset_peak() -> float:
-    """Forget the largest resident memory so far; the present one [MB], nan where the system does not tell."""
-    try:
-        with open("/proc/self/clear_refs", "w") as file:
-            file.write("5")
-        return _status("VmRSS")
-    except OSError:
-        return np.nan
-
-
-def peak() -> float:
-    try:
-        return _status("VmHWM")
-    except OSError:
-        return np.nan
-
-
-def _status(field: str) -> float:
-    with open("/proc/self/status") as file:
-        return next(int(line.split()[1]) * 1024 / MB for line in file if line.startswith(field))
+    """The certificate of the same problem under the associated law."""
+    return natural_map_residual(replace(problem, law=Associated(problem.mu)), r, lam)

@@ -1,4 +1,8 @@
-"""Methods and problems of the user: decorated in a file that the experiment names, or entry points of a package."""
+"""Methods and problems of the user: decorated in a file that the experiment names, or entry points of a package.
+
+A plug-in runs in worker processes only. The campaign knows it by what it declares, which a process of its own reads
+(contactopt.benchmark.catalogue).
+"""
 
 from __future__ import annotations
 
@@ -49,7 +53,7 @@ def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -
         raise InputError(f"law must be one of {', '.join(LAWS)}; got {law!r}.")
 
     def register(make: Any) -> Any:
-        plugin = Plugin(name or make.__name__, make, law)
+        plugin = Plugin(_name("method", make, name), make, law)
         if plugin.name in METHODS:
             raise InputError(f"plug-in method {plugin.name!r} has the name of a method of contactopt; rename it.")
         _methods[plugin.name] = plugin
@@ -62,10 +66,20 @@ def problem(make: Any = None, *, name: str | None = None) -> Any:
     """Register a function of named parameters that returns an InterfaceProblem, for `family = NAME`."""
 
     def register(make: Any) -> Any:
-        _problems[name or make.__name__] = make
+        _problems[_name("problem", make, name)] = make
         return make
 
     return register if make is None else register(make)
+
+
+def _name(kind: str, make: Any, name: object) -> str:
+    """The name under which `make` is registered; InputError if one of the two is of the wrong kind."""
+    if not callable(make):
+        raise InputError(f"a plug-in {kind} must be a function or a class; got {type(make).__name__}.")
+    found = getattr(make, "__name__", None) if name is None else name
+    if not isinstance(found, str) or not found.strip() or not found.isprintable():
+        raise InputError(f"a plug-in {kind} needs a name of printable characters; got {found!r}.")
+    return found
 
 
 def load_plugins(paths: Iterable[str | Path]) -> None:
@@ -81,7 +95,7 @@ def load_plugins(paths: Iterable[str | Path]) -> None:
         sys.modules[spec.name] = module  # dataclasses look their module up
         try:
             spec.loader.exec_module(module)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise InputError(f"plug-in '{path}' failed: {type(error).__name__}: {error}") from error
         _loaded.add(path)
 

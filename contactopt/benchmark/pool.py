@@ -1,145 +1,185 @@
-"""Worker processes seen from outside: start, watch, kill, replace; many of them on one machine, or on a Dask cluster."""
+"""Runs made by worker processes: problems built, methods run, answers certified; on one machine, or on a Dask cluster."""
 
 from __future__ import annotations
 
-import os
 import queue
-import signal
 import subprocess
-import sys
-import tempfile
 import threading
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import islice
-from multiprocessing import Pipe
-from multiprocessing.connection import Connection
 from typing import Any
 
-from contactopt.benchmark.measure import Task, blank, short
+from contactopt.benchmark.measure import Answer, Task, blank, judge
+from contactopt.benchmark.problems import FAMILIES
+from contactopt.benchmark.process import START, Ended, Process, one_line
+from contactopt.benchmark.wire import ForeignMessage
 from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem
 
-LIBRARIES = ("OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "BLIS_NUM", "NUMEXPR_NUM", "VECLIB_MAXIMUM", "RAYON_NUM")
-ONE_THREAD = {f"{name}_THREADS": "1" for name in LIBRARIES}
+START_LIMIT = 120.0  # s until a process answers at all
 BUILD_LIMIT = 1800.0  # s to build a problem
 WARM_UP_LIMIT = 30.0  # s to import what a method needs, beyond its time limit
 MARGIN, GRACE = 1.1, 0.5  # the hard limit is MARGIN * time_limit + GRACE: methods may end by themselves first
-MEMORY_WORDS = (b"MemoryError", b"bad_alloc", b"out of memory", b"Out of memory", b"Cannot allocate memory")
+ROOM = 1e6  # bytes of a message beyond the arrays that it must hold
+DIAGNOSED = ("rank", "condition", "guaranteed_mu", "alternating_mu", "tresca_mu")
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """A problem as the campaign holds it, by which answers are judged; the columns that it fills."""
+
+    label: str
+    problem: InterfaceProblem
+    facts: dict[str, Any]
+
+
+class NotBuilt(Exception):
+    """A problem could not be built; the message says how."""
 
 
 class Worker:
-    """One worker process at a time, replaced when it dies or is killed. `run` blocks; use from one thread."""
+    """Two processes: one builds problems and never runs a method, one runs methods and never builds a problem.
+
+    Between them the problem is held here, where no plug-in runs, and every answer is judged by it. `run` blocks; use from
+    one thread.
+    """
 
     def __init__(self) -> None:
-        self.process: subprocess.Popen | None = None
-        self.pipe: Connection
+        self.builder, self.solver = Process("build"), Process("solve")
+        self.held: Built | None = None
+        self.sent = ""  # label of the problem that the solver keeps
+        self.doubted = ""  # method that failed in the process and may have left it in disorder
         self.cold: set[str] = set()  # methods that did not survive their warm-up
-        self.broken: dict[str, str] = {}  # problems whose building ended the process -> how
-        self.facts: dict[str, dict[str, Any]] = {}  # problem -> the columns it fills
-        self.noise = tempfile.TemporaryFile(mode="a+b")  # noqa: SIM115 (what solvers print)
+        self.broken: dict[str, str] = {}  # problems that cannot be built -> how
 
     def __enter__(self) -> Worker:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self.kill()
-        self.noise.close()
+        self.close()
+
+    @property
+    def process(self) -> subprocess.Popen | None:
+        """The process that runs methods, if there is one now."""
+        return self.solver.process
+
+    def close(self) -> None:
+        self.builder.close()
+        self.solver.close()
+
+    def interrupt(self) -> None:
+        """Let `run` end soon, from another thread."""
+        self.builder.interrupt()
+        self.solver.interrupt()
 
     def run(self, task: Task) -> dict[str, Any]:
-        """The row of this run, whatever happens to the process."""
-        label = task.run.problem.label
-        if label in self.broken:
-            return blank(task) | {"status": "not_built", "message": self.broken[label]}
-        task = replace(task, warm_up=task.run.method.label not in self.cold)
-        begin = time.perf_counter()
-        phase, end = self._watch(task)
-        if isinstance(end, dict):
-            if end["status"] == "out_of_memory":
-                self.kill()  # its memory is fragmented at best
-            return end
-        status, message = end
-        if phase == "warm up":  # says nothing of the run itself
-            self.cold.add(task.run.method.label)
-            return self.run(task)
-        row = (
-            blank(task)
-            | self.facts.get(label, {})
-            | {"status": status, "message": message, "call_seconds": time.perf_counter() - begin}
-        )
-        if phase == "start":
-            raise RuntimeError(f"a worker process cannot start: {status}, {message}")
-        if phase == "build":
-            self.broken[label] = f"{status} while the problem was built: {message}".rstrip(": ")
-            return row | {"status": "not_built", "message": self.broken[label]}
-        return row
-
-    def _watch(self, task: Task) -> tuple[str, dict[str, Any] | tuple[str, str]]:
-        """The last phase, and the row or (status, message)."""
-        if self.process is None:
-            self._start()
-        self.noise.truncate(0)
-        hard = MARGIN * task.time_limit + GRACE
-        limits = {"start": BUILD_LIMIT, "build": BUILD_LIMIT, "warm up": WARM_UP_LIMIT + hard, "solve": hard}
-        phase = "start"
+        """The row of this run, whatever happens to the processes."""
+        row = blank(task)
         try:
-            self.pipe.send(task)
-            deadline = time.monotonic() + limits[phase]
-            while self.pipe.poll(max(0.0, deadline - time.monotonic())):
-                message = self.pipe.recv()
-                if isinstance(message, dict) and "key" in message:
-                    return phase, message
-                if isinstance(message, dict):
-                    self.facts[task.run.problem.label] = message
-                    continue
-                phase = message
-                deadline = time.monotonic() + limits[phase]
-        except (EOFError, OSError):
-            return phase, self._death()
-        self.kill()
-        return phase, ("killed", f"still running after {limits[phase]:g} s")
+            built = self._build(task)
+        except NotBuilt as error:
+            return row | {"status": "not_built", "message": str(error)}
+        row |= built.facts
+        try:
+            row["backend"] = task.run.method.backends(built.problem.dim)
+        except InputError as error:
+            return row | {"status": "refused", "message": one_line(error)}
+        begin = time.perf_counter()
+        try:
+            row |= judge(task, built.problem, self._answer(task, built))
+            if task.run.method.plugin is not None and not row["success"] and row["status"] != "refused":
+                self.doubted = task.run.method.label
+            return row
+        except Ended as end:
+            row |= {"status": end.status, "message": end.message, "call_seconds": time.perf_counter() - begin}
+            if end.phase == "neighbour":
+                row |= {
+                    "status": "not_built",
+                    "message": f"{end.status} while its warm start was sought: {end.message}",
+                }
+            return row
 
-    def _start(self) -> None:
-        self.pipe, theirs = Pipe()
-        code = "from contactopt.benchmark.worker import main; main()"
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", code, str(theirs.fileno()), str(os.getpid())],
-            pass_fds=[theirs.fileno()],
-            stdin=subprocess.DEVNULL,
-            stdout=self.noise,
-            stderr=self.noise,
-            env=os.environ | ONE_THREAD,
-            process_group=0,  # so that what a solver starts dies with it
-        )
-        theirs.close()
+    def _build(self, task: Task) -> Built:
+        """The task's problem, held or built anew."""
+        spec = task.run.problem
+        if spec.label in self.broken:
+            raise NotBuilt(self.broken[spec.label])
+        if self.held is not None and self.held.label == spec.label:
+            return self.held
+        self.held = None
+        self.solver.start()  # imports at the same time
+        # A process that has loaded plug-ins builds nothing else: they may have changed the library there.
+        foreign = spec.kind == "family" and spec.name not in FAMILIES
+        if foreign:
+            self.builder.kill()
+        request = (spec, task.plugins if foreign else (), task.diagnose, task.memory_limit)
+        try:
+            found = self.builder.ask(request, {START: BUILD_LIMIT}, 1e9 * task.memory_limit)
+            if "error" in found:
+                raise NotBuilt(one_line(str(found["error"])))
+            problem = replace(found["problem"])  # checked again, and nothing kept that was worked out elsewhere
+            facts = {"fingerprint": problem.fingerprint, "contacts": problem.contacts, "dim": problem.dim}
+            facts |= {"plates": len(problem.s), "build_seconds": float(found["build_seconds"])}
+            facts |= {name: float(found["diagnosis"][name]) for name in DIAGNOSED if found["diagnosis"]}
+        except Ended as end:
+            how = f"{end.status} while the problem was built: {end.message}".rstrip(": ")
+            self.broken[spec.label] = how
+            raise NotBuilt(how) from end
+        except NotBuilt as error:
+            self.broken[spec.label] = str(error)
+            raise
+        except (LookupError, TypeError, ValueError) as error:
+            self.broken[spec.label] = f"what was built is no problem: {one_line(error)}"
+            raise NotBuilt(self.broken[spec.label]) from error
+        finally:
+            if foreign:
+                self.builder.kill()
+        self.held = Built(spec.label, problem, facts)
+        return self.held
 
-    def _death(self) -> tuple[str, str]:
-        """How the process ended by itself: (status, message)."""
-        assert self.process is not None
-        with suppress(subprocess.TimeoutExpired):
-            self.process.wait(5)
-        code = self.process.poll()
-        self.noise.seek(0)
-        said = self.noise.read()[-4000:]
-        self.kill()
-        last = said.strip().splitlines()[-1].decode(errors="replace") if said.strip() else ""
-        if any(word in said for word in MEMORY_WORDS):
-            return "out_of_memory", short(last)
-        if code == -signal.SIGKILL:
-            return "out_of_memory", "killed from outside, as the system does when memory runs out"
-        how = signal.Signals(-code).name if code is not None and code < 0 else f"exit code {code}"
-        return "crashed", short(f"{how}: {last}".rstrip(": "))
+    def _answer(self, task: Task, built: Built) -> Answer:
+        """What the method answers. Raises Ended if its process did not outlive it."""
+        method = task.run.method.label
+        if self.doubted not in ("", method):
+            self._restart()
+        used = self.solver.running and bool(self.sent)
+        known = self.solver.running and self.sent == built.label
+        problem = None if known else built.problem
+        hard = MARGIN * task.time_limit + GRACE
+        limits = {START: START_LIMIT, "neighbour": BUILD_LIMIT, "warm up": WARM_UP_LIMIT + hard, "solve": hard}
+        room = ROOM + 16.0 * (built.problem.q.size + len(built.problem.s))
+        self.sent = built.label
+        try:
+            task = replace(task, warm_up=method not in self.cold)
+            answer = Answer.of(self.solver.ask((task, problem), limits, room), built.problem)
+        except ForeignMessage as error:
+            self._restart()
+            raise Ended("solve", "error", f"its process sent what it was not asked for: {error}") from error
+        except Ended as end:
+            self._restart()
+            if end.phase == "warm up":  # says nothing of the run itself
+                self.cold.add(method)
+                return self._answer(task, built)
+            if end.phase != START:
+                raise
+            if used:  # an earlier run left the process in disorder
+                return self._answer(task, built)
+            if end.status != "error":
+                raise InputError(
+                    f"a worker process cannot start ({end.status}, {end.message}); is memory_limit, "
+                    f"{task.memory_limit:g} GB, enough?"
+                ) from end
+            raise
+        if answer.status == "out_of_memory":
+            self._restart()  # its memory is fragmented at best
+        return answer
 
-    def kill(self) -> None:
-        if self.process is None:
-            return
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(self.process.pid, signal.SIGKILL)
-        self.process.wait()
-        self.pipe.close()
-        self.process = None
+    def _restart(self) -> None:
+        self.solver.kill()
+        self.sent = self.doubted = ""
 
 
 class Shares:
@@ -193,12 +233,10 @@ def run_locally(tasks: Sequence[Task], jobs: int) -> Iterator[dict[str, Any]]:
     finally:
         stop.set()
         for worker in workers:
-            if worker.process is not None:
-                with suppress(ProcessLookupError):
-                    os.killpg(worker.process.pid, signal.SIGKILL)
+            worker.interrupt()
         for thread, worker in zip(threads, workers):
             thread.join(10)
-            worker.kill()
+            worker.close()
 
 
 _of_thread = threading.local()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as la
 
+from contactopt.benchmark.catalogue import Arguments, arguments_of, bind
 from contactopt.benchmark.plugins import plugin_problems
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
@@ -38,16 +38,19 @@ class ProblemSpec:
         given = ", ".join(f"{key}={short_number(value)}" for key, value in self.parameters.items())
         return f"{self.name}({given})" if given else self.name
 
-    def check(self) -> None:
-        """InputError if the name or a parameter is unknown or out of range. Builds nothing."""
+    def check(self, declared: Mapping[str, Arguments]) -> None:
+        """InputError if the name or a parameter is unknown or out of range. Builds nothing.
+
+        declared  arguments of the problems that plug-ins declare, by name
+        """
         if self.kind == "scene":
             scene(self.name, **self.parameters)
         elif self.kind == "family":
-            families = FAMILIES | plugin_problems()
+            families = {name: arguments_of(family) for name, family in FAMILIES.items()} | dict(declared)
             if self.name not in families:
                 raise InputError(f"unknown family {self.name!r}; choose from {', '.join(families)}.")
             try:
-                inspect.signature(families[self.name]).bind(**self.parameters)
+                bind(families[self.name], **self.parameters)
             except TypeError as error:
                 raise InputError(f"family '{self.name}': {error}.") from error
 

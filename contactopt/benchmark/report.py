@@ -18,7 +18,6 @@ import html
 import io
 import os
 import re
-import tempfile
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,9 +26,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contactopt.benchmark.figures import FIGURES
+from contactopt.benchmark.files import subfolder, told
 from contactopt.benchmark.store import COLUMNS, load, require, save
 from contactopt.benchmark.tables import TABLES, select
+from contactopt.checks import check_name
 from contactopt.errors import InputError
+from contactopt.files import remove_files, replace_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,6 +39,11 @@ if TYPE_CHECKING:
 LEFT_OUT = ("key", "label", "base_mb", "history")  # of a report's table
 PAGE = "benchmarks.html"
 DPI, SHADES = 90, 256
+# Whatever an experiment's texts hold, a browser loads nothing from elsewhere and runs no script.
+POLICY = (
+    '<meta http-equiv="Content-Security-Policy" '
+    "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
+)
 STYLE = """body{max-width:60rem;margin:2rem auto;padding:0 1rem;font:16px/1.5 system-ui,sans-serif;color:#222}
 table{border-collapse:collapse;font-size:13px;display:block;overflow-x:auto}td,th{border:1px solid #ccc;padding:.2rem .5rem}
 img{max-width:100%}code{background:#f3f3f3}section{border-top:2px solid #999;margin-top:3rem}"""
@@ -62,17 +69,29 @@ def read_layout(path: str | Path) -> Layout:
         data = tomllib.loads(path.read_text())
     except (OSError, ValueError) as error:
         raise InputError(f"cannot read the experiment '{path}': {error}") from error
-    for number, entry in enumerate(data.get("figures", []), 1):
-        if entry.get("kind") not in FIGURES | TABLES:
+    figures, columns = data.get("figures", []), data.get("columns", [])
+    if not isinstance(figures, list) or not all(isinstance(entry, dict) for entry in figures):
+        raise InputError(f"'{path}': 'figures' must be a list of tables, [[figures]].")
+    if not isinstance(columns, list) or not all(isinstance(name, str) for name in columns):
+        raise InputError(f"'{path}': 'columns' must be a list of texts.")
+    for number, entry in enumerate(figures, 1):
+        if not isinstance(entry.get("kind"), str) or entry["kind"] not in FIGURES | TABLES:
             kinds = ", ".join(FIGURES | TABLES)
             raise InputError(f"'{path}', figure {number}: unknown kind {entry.get('kind')!r}; choose from {kinds}.")
-        if not entry.get("caption"):
+        if not entry.get("caption") or not isinstance(entry["caption"], str):
             raise InputError(f"'{path}', figure {number}: it needs a caption.")
+        if not isinstance(entry.get("where", {}), dict):
+            raise InputError(f"'{path}', figure {number}: 'where' must be a table of columns and values.")
+    texts = {key: data.get(key) or "" for key in ("title", "text", "findings")}
+    for key, text in texts.items():
+        if not isinstance(text, str):
+            raise InputError(f"'{path}': '{key}' must be a text.")
     name = data.get("name", path.stem)
-    texts = (data.get("title") or name, data.get("text", ""))
-    return Layout(
-        path, name, *texts, tuple(data.get("figures", ())), data.get("findings", ""), tuple(data.get("columns", ()))
-    )
+    try:
+        check_name("'name'", name)
+    except InputError as error:
+        raise InputError(f"'{path}': {error}") from error
+    return Layout(path, name, texts["title"] or name, texts["text"], tuple(figures), texts["findings"], tuple(columns))
 
 
 def publish(experiment: str | Path, results: str | Path, reports: str | Path) -> Path:
@@ -80,7 +99,7 @@ def publish(experiment: str | Path, results: str | Path, reports: str | Path) ->
     layout = read_layout(experiment)
     kept = {"history"} if any(entry["kind"] == "convergence" for entry in layout.figures) else set()
     columns = [*layout.columns] or [name for name in COLUMNS if name not in LEFT_OUT or name in kept]
-    target = Path(reports) / layout.name / "rows.csv"
+    target = subfolder(Path(reports), layout.name) / "rows.csv"
     save(load(results), target, columns)
     return target
 
@@ -91,17 +110,22 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
     Raises InputError if none has one, or if a figure's arguments do not fit its table.
     """
     require("markdown_it", "pandas")
-    reports, bodies, errors = Path(reports), [], []
+    reports, errors = Path(reports), []
+    bodies: list[tuple[Layout, Path, str]] = []
     for path in experiments:
         try:
             layout = read_layout(path)
-            folder = reports / layout.name
+            if layout.name in [other.name for other, _, _ in bodies]:
+                raise InputError(f"'{path}': another experiment is called {layout.name!r} too; rename one.")
+            folder = subfolder(reports, layout.name)
             if (folder / "rows.csv").exists():
-                bodies.append((layout, folder, _write_report(layout, folder)))
+                with told(folder):
+                    bodies.append((layout, folder, _write_report(layout, folder)))
         except InputError as error:
             errors.append(str(error))
     if bodies:
-        _replace(reports / PAGE, _page(bodies))
+        with told(reports):
+            _replace(reports / PAGE, page_of(bodies))
     if errors:  # after all the others are done
         raise InputError("; ".join(errors))
     if not bodies:
@@ -113,19 +137,19 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
 
 def _write_report(layout: Layout, folder: Path) -> str:
     table = load(folder / "rows.csv")
-    parts = [f"# {layout.title}", layout.text.strip()]
+    parts = [f"# {one_line(layout.title)}", inert(layout.text.strip())]
     if layout.findings:
-        parts.append("\n".join(f"{n}. {text}" for n, text in enumerate(_findings(layout, table), 1)))
-    for old in folder.glob("figure-*.png"):
-        old.unlink()
+        parts.append("\n".join(f"{n}. {inert(text)}" for n, text in enumerate(_findings(layout, table), 1)))
+    remove_files(folder, [old.name for old in folder.glob("figure-*.png")])
     for number, entry in enumerate(layout.figures, 1):
         result = _drawn(layout, number, entry, table)
         if entry["kind"] in TABLES:
-            parts += [markdown(result), f"*Table {number}. {entry['caption']}*"]
+            parts += [markdown(result), f"*Table {number}. {one_line(entry['caption'])}*"]
         else:
-            picture = folder / f"figure-{number}.png"
-            picture.write_bytes(_png(result))
-            parts += [f"![{_plain(entry['caption'])}]({picture.name})", f"*Figure {number}. {entry['caption']}*"]
+            picture, caption = folder / f"figure-{number}.png", one_line(entry["caption"])
+            image = _png(result)
+            replace_file(picture, lambda file, image=image: file.write_bytes(image))  # type: ignore[misc]
+            parts += [f"![{_plain(caption)}]({picture.name})", f"*Figure {number}. {caption}*"]
     parts.append(_foot(layout, folder, table))
     text = "\n\n".join(part for part in parts if part) + "\n"
     _replace(folder / "report.md", text)
@@ -137,9 +161,20 @@ def _drawn(layout: Layout, number: int, entry: Mapping[str, Any], table: pd.Data
     where = dict(entry.get("where", {}))
     try:
         rows = select(table, where.pop("law", "coulomb"), **where)
-        return (FIGURES | TABLES)[entry["kind"]](rows, **arguments)
-    except (InputError, TypeError, KeyError) as error:
+        return (
+            TABLES[entry["kind"]](rows, **arguments)
+            if entry["kind"] in TABLES
+            else FIGURES[entry["kind"]](_without_formulas(rows), **arguments)
+        )
+    except (ValueError, TypeError, LookupError, AttributeError) as error:  # InputError is a ValueError
         raise InputError(f"'{layout.path}', figure {number} ({entry['kind']}): {error}") from error
+
+
+def _without_formulas(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows with every $ in a text marked as a plain character: names are not formulas for Matplotlib to set."""
+    texts = [name for name in rows if name != "history" and rows[name].map(lambda value: isinstance(value, str)).any()]
+    plain = {name: rows[name].map(lambda v: v.replace("$", r"\$") if isinstance(v, str) else v) for name in texts}
+    return rows.assign(**plain)
 
 
 def _findings(layout: Layout, table: pd.DataFrame) -> list[str]:
@@ -166,7 +201,9 @@ def _foot(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
         "machine; CPU times are compared, time limits are wall).",
         f"Experiment: [`{layout.path.name}`]({link}); table: [`rows.csv`](rows.csv).",
         f"Made by `contactopt report --run full {layout.path.stem}`; rebuilt from the table by `contactopt report`.",
-        f"Environment: {'; '.join(sorted(set(table['machine'])))}. {'; '.join(sorted(set(table['versions'])))}. One BLAS thread.",
+        one_line(
+            f"Environment: {'; '.join(sorted(set(table['machine'])))}. {'; '.join(sorted(set(table['versions'])))}. One BLAS thread."
+        ),
     ]
     return "\n".join(lines + ([f"Backends: {', '.join(backends)}."] if backends else []))
 
@@ -175,11 +212,25 @@ def markdown(table: pd.DataFrame) -> str:
     """A table in Markdown; numbers with three significant digits."""
 
     def text(value: Any) -> str:
-        return f"{value:.3g}" if isinstance(value, float) else str(value).replace("|", "\\|")
+        return f"{value:.3g}" if isinstance(value, float) else literal(str(value))
 
     rows = [[text(v) for v in row] for row in table.itertuples(index=False)]
-    lines = [[str(c) for c in table.columns], ["---"] * len(table.columns), *rows]
+    lines = [[literal(str(c)) for c in table.columns], ["---"] * len(table.columns), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def inert(text: object) -> str:
+    """Markdown in which raw HTML is text: a `<` that could open a tag is written as an entity."""
+    return re.sub(r"<(?=[A-Za-z/!?])", "&lt;", str(text))
+
+
+def one_line(text: object) -> str:
+    return inert(" ".join(str(text).split()))
+
+
+def literal(text: str) -> str:
+    """The text in a cell of a table: no HTML, no link, no picture, no end of the cell."""
+    return one_line(text).replace("|", "\\|").replace("](", "]\\(")
 
 
 def _png(figure: Any) -> bytes:
@@ -192,22 +243,47 @@ def _png(figure: Any) -> bytes:
     return small.getvalue()
 
 
-def _page(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
+def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
+    """One HTML page of reports (layout, folder, Markdown). It stands alone and holds no script."""
+    links = "".join(
+        f'<li><a href="#{html.escape(layout.name)}">{html.escape(layout.title)}</a></li>' for layout, _, _ in bodies
+    )
+    sections = [
+        f'<section id="{html.escape(layout.name)}">{rendered(text, folder)}</section>'
+        for layout, folder, text in bodies
+    ]
+    head = f'<!doctype html><html lang="en"><meta charset="utf-8">{POLICY}<title>contactopt: benchmarks</title>'
+    head += f"<style>{STYLE}</style>"
+    return f"{head}<h1>Benchmarks</h1><ul>{links}</ul>{''.join(sections)}</html>\n"
+
+
+def rendered(text: str, folder: Path) -> str:
+    """Markdown as HTML: pictures of the report embedded, raw HTML shown as text, links only to the web and the page."""
     from markdown_it import MarkdownIt
 
-    render = MarkdownIt("commonmark").enable("table").render
-    links = "".join(f'<li><a href="#{layout.name}">{html.escape(layout.title)}</a></li>' for layout, _, _ in bodies)
-    sections = []
-    for layout, folder, text in bodies:
+    parser = MarkdownIt("commonmark", {"html": False}).enable("table")
+    tokens = parser.parse(text)
+    for token in tokens:
+        opened: list[Any] = []
+        for child in token.children or ():
+            if child.type == "link_open":
+                opened.append(child)
+                child.hidden = not re.match(r"https?://|#", str(child.attrGet("href")))
+            elif child.type == "link_close":
+                child.hidden = opened.pop().hidden
+            elif child.type == "image":
+                _embed(child, folder)
+    return str(parser.renderer.render(tokens, parser.options, {}))
 
-        def inline(match: re.Match[str], folder: Path = folder) -> str:
-            return f'src="data:image/png;base64,{base64.b64encode((folder / match[1]).read_bytes()).decode()}"'
 
-        body = re.sub(r'src="(figure-\d+\.png)"', inline, render(text))
-        body = re.sub(r'<a href="(?!http|#)[^"]*">(.*?)</a>', r"\1", body)  # the page stands alone
-        sections.append(f'<section id="{layout.name}">{body}</section>')
-    head = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>contactopt: benchmarks</title><style>{STYLE}</style>'
-    return f"{head}<h1>Benchmarks</h1><ul>{links}</ul>{''.join(sections)}</html>\n"
+def _embed(image: Any, folder: Path) -> None:
+    """Put the data of a report's own picture into its token; any other picture becomes its description."""
+    source = str(image.attrGet("src"))
+    file = folder / source
+    if re.fullmatch(r"figure-\d+\.png", source) and file.is_file() and not file.is_symlink():
+        image.attrSet("src", "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode())
+    else:
+        image.type, image.tag, image.children = "text", "", None
 
 
 def _plain(text: str) -> str:
@@ -215,8 +291,4 @@ def _plain(text: str) -> str:
 
 
 def _replace(path: Path, text: str) -> None:
-    handle, name = tempfile.mkstemp(dir=path.parent)
-    with os.fdopen(handle, "w") as file:
-        file.write(text)
-    os.chmod(name, 0o644)
-    os.replace(name, path)
+    replace_file(path, lambda file: file.write_text(text, encoding="utf-8"))

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
-from contactopt.benchmark.plugins import Plugin, find_plugin
+from contactopt.benchmark.catalogue import Declared, bind
 from contactopt.benchmark.problems import ProblemSpec, short_number
 from contactopt.errors import InputError
 from contactopt.solving.backends import CONIC, QP
@@ -25,20 +24,17 @@ OTHER_LAWS = {"relaxation": "associated"}  # methods of contactopt that solve an
 
 @dataclass(frozen=True)
 class MethodSpec:
-    """A method of contactopt or a plug-in, with the settings that were given."""
+    """A method of contactopt, or a plug-in by what it declares, with the settings that were given."""
 
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)
+    plugin: Declared | None = None
 
     @property
     def label(self) -> str:
         texts = {k: short_number(v) if isinstance(v, float) else repr(v) for k, v in self.settings.items()}
         given = ", ".join(f"{key}={text}" for key, text in texts.items())
         return f"{self.name}({given})" if given else self.name
-
-    @property
-    def plugin(self) -> Plugin | None:
-        return None if self.name in METHODS else find_plugin(self.name)
 
     @property
     def law(self) -> str:
@@ -51,10 +47,9 @@ class MethodSpec:
                 f"unknown method {self.name!r}; choose from {', '.join(METHODS)}, or name its plug-in file."
             )
         if self.plugin is not None:
-            wanted = inspect.signature(self.plugin.make)
-            given = {name: None for name in PASSED if name in wanted.parameters} | dict(self.settings)
+            given = {name: None for name in PASSED if name in self.plugin.names} | dict(self.settings)
             try:
-                wanted.bind(*[None] * (not self.plugin.iterates), **given)
+                bind(self.plugin.arguments, *[None] * (not self.plugin.iterates), **given)
             except TypeError as error:
                 raise InputError(f"method '{self.name}': {error}.") from error
         else:

@@ -9,8 +9,9 @@ from __future__ import annotations
 import base64
 import fcntl
 import json
+import logging
 import os
-import tempfile
+import stat
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,7 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactopt.benchmark.files import told
 from contactopt.errors import InputError
+from contactopt.files import replace_file
 from contactopt.problem import Status
 
 if TYPE_CHECKING:
@@ -88,6 +91,9 @@ STATUSES = {s.label: s.sentence for s in Status} | {
     "not_built": "the problem itself could not be built",
 }
 REFERENCE = 1e-8  # largest residual of a reference solution
+LATER = ("error",)  # columns that load() works out
+KINDS: dict[str, type | tuple[type, ...]] = {"int": int, "str": str, "float": (int, float), "bool": bool}
+_log = logging.getLogger(__name__)
 
 
 def require(*modules: str) -> None:
@@ -101,10 +107,20 @@ class Store:
     """The appending end, for one campaign at a time (file lock). Use as a context manager."""
 
     def __init__(self, folder: Path, resume: bool):
-        """InputError if the folder holds results and `resume` is not set, or if another campaign writes there."""
-        folder.mkdir(parents=True, exist_ok=True)
+        """InputError if the folder holds results and `resume` is not set, or if another campaign writes there.
+
+        A rows.jsonl that is a symbolic link is refused, as is a folder in which nothing can be written.
+        """
         self.path = folder / "rows.jsonl"
-        self.descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        if self.path.is_symlink():
+            raise InputError(f"'{self.path}' is a symbolic link, which is not followed; choose another --out.")
+        with told(folder, "choose another --out"):
+            folder.mkdir(parents=True, exist_ok=True)
+            flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW
+            self.descriptor = os.open(self.path, flags, 0o644)
+        if not stat.S_ISREG(os.fstat(self.descriptor).st_mode):
+            os.close(self.descriptor)
+            raise InputError(f"'{self.path}' is no regular file; choose another --out.")
         try:
             fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -139,24 +155,51 @@ class Store:
         return {row["key"] for row in lines(self.path)}
 
     def append(self, row: dict[str, Any]) -> None:
-        data = (json.dumps(row) + "\n").encode()
-        while data:  # a second write only if the disk is full or a signal came
-            data = data[os.write(self.descriptor, data) :]
+        """Write one row, or nothing of it: InputError if the disk is full."""
+        data, end = (json.dumps(row) + "\n").encode(), os.fstat(self.descriptor).st_size
+        try:
+            while data:  # a second write only if the disk is nearly full or a signal came
+                data = data[os.write(self.descriptor, data) :]
+        except OSError as error:
+            os.ftruncate(self.descriptor, end)
+            raise InputError(
+                f"cannot write into '{self.path}': {error.strerror}; finished runs are kept, make room and go on with "
+                "--resume."
+            ) from error
 
 
 def lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The rows of a rows.jsonl; lines that are not whole are left out."""
+    """The rows of a rows.jsonl. Lines that are no rows are left out, with a warning: their runs count as not made."""
+    bad = 0
     with open(path, "rb") as file:
         for line in file:
             try:
                 row = json.loads(line)
-            except ValueError:
-                continue
-            if row.get("schema", 0) > SCHEMA:
+            except (ValueError, RecursionError):
+                row = None
+            if isinstance(row, dict) and isinstance(row.get("schema"), int) and row["schema"] > SCHEMA:
                 raise InputError(
                     f"'{path}' was written by a newer version (schema {row['schema']}); update contactopt."
                 )
-            yield row
+            if is_row(row):
+                yield row
+            else:
+                bad += 1
+    if bad:
+        _log.warning("'%s': %d lines are no rows of a campaign and are left out", path, bad)
+
+
+def is_row(row: Any) -> bool:
+    """Whether it has every column that a run fills, each of its type."""
+    if not isinstance(row, dict) or not isinstance(row.get("answer", ""), str):
+        return False
+    for name, (kind, _) in COLUMNS.items():
+        value = row.get(name)
+        if name not in LATER and (not isinstance(value, KINDS[kind]) or isinstance(value, bool) != (kind == "bool")):
+            return False
+        if isinstance(value, int) and abs(value) >= 2**63:
+            return False
+    return True
 
 
 def pack(reactions: np.ndarray) -> str:
@@ -192,14 +235,18 @@ def load(path: str | Path) -> pd.DataFrame:
             table = pd.read_csv(
                 path, dtype=texts, keep_default_na=False, na_values={n: ["", "nan"] for n in COLUMNS if n not in texts}
             )
-    except (OSError, ValueError) as error:
+        if len(table) and int(table["schema"].max()) > SCHEMA:
+            raise InputError(f"'{path}' was written by a newer version; update contactopt.")
+        for source, prefix in (("parameters", "problem"), ("settings", "method")):
+            if source in table:
+                given = pd.DataFrame([dict(json.loads(text or "{}")) for text in table[source]], index=table.index)
+                table = table.join(given.add_prefix(f"{prefix}."))
+    except InputError:
+        raise
+    except KeyError as error:
+        raise InputError(f"cannot read the results '{path}': it has no column {error}.") from error
+    except (OSError, ValueError, TypeError) as error:
         raise InputError(f"cannot read the results '{path}': {error}") from error
-    if len(table) and int(table["schema"].max()) > SCHEMA:
-        raise InputError(f"'{path}' was written by a newer version; update contactopt.")
-    for source, prefix in (("parameters", "problem"), ("settings", "method")):
-        if source in table:
-            given = pd.DataFrame([json.loads(text or "{}") for text in table[source]], index=table.index)
-            table = table.join(given.add_prefix(f"{prefix}."))
     return table
 
 
@@ -218,27 +265,27 @@ def _from_lines(path: Path) -> pd.DataFrame:
         answer, row["error"] = row.pop("answer", ""), np.nan
         if answer and row["fingerprint"] in reference:
             exact = reference[row["fingerprint"]]
-            size = float(np.linalg.norm(exact))
-            row["error"] = float(np.linalg.norm(unpack(answer) - exact)) / size if size > 0 else np.nan
+            found, size = unpack(answer), float(np.linalg.norm(exact))
+            if size > 0 and found.shape == exact.shape:
+                row["error"] = float(np.linalg.norm(found - exact)) / size
     types = {"int": "int64", "str": "str", "float": "float64", "bool": "bool"}
     table = pd.DataFrame(list(rows.values()), columns=list(COLUMNS))
     return table.astype({name: types[kind] for name, (kind, _) in COLUMNS.items()})
 
 
 def save(table: pd.DataFrame, path: str | Path, columns: list[str] | None = None) -> None:
-    """Write a table as .parquet or .csv, complete or not at all; `columns` of COLUMNS, all by default."""
+    """Write a table as .parquet or .csv, complete or not at all; `columns` of COLUMNS, all by default.
+
+    Raises InputError if it cannot be written, as on a full disk.
+    """
     path = Path(path)
     chosen = table[[c for c in (columns or COLUMNS) if c in table]]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    try:
+
+    def write(file: Path) -> None:
         if path.suffix == ".parquet":
-            chosen.to_parquet(name, index=False)
+            chosen.to_parquet(file, index=False)
         else:
-            chosen.to_csv(name, index=False, float_format="%.6g")
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+            chosen.to_csv(file, index=False, float_format="%.6g")
+
+    with told(path, "make room or choose another directory; finished runs are kept"):
+        replace_file(path, write)

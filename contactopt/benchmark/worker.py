@@ -1,102 +1,81 @@
-"""The process in which runs happen: receives tasks over a pipe, sends rows back.
+"""The processes in which code of the user runs: they receive requests over a socket and send answers back.
 
-It may crash, hang or run out of memory at any moment: contactopt.benchmark.pool watches it from outside. Between tasks it
-keeps the last problems it built and the modules its methods imported; a method's first run in a process is preceded by
-an untimed one on a problem of two contacts, so that imports and compilation are not timed.
+They may crash, hang or run out of memory at any moment: contactopt.benchmark.process watches them from outside. There
+are three roles, each in a process of its own: one lists what plug-ins declare, one builds problems, one runs methods.
+What runs methods gets its problems from outside and judges nothing.
 """
 
 from __future__ import annotations
 
 import os
+import socket
 import sys
 import time
-from collections import OrderedDict
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from multiprocessing.connection import Connection
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from contactopt.benchmark.measure import Task, blank, call, measure, short
+from contactopt.benchmark.calls import call, measure, no_answer
+from contactopt.benchmark.measure import Task
 from contactopt.benchmark.plugins import load_plugins
 from contactopt.benchmark.problems import ProblemSpec
+from contactopt.benchmark.process import one_line
+from contactopt.benchmark.wire import Channel
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.laws.coulomb import Coulomb
+from contactopt.problem.operators import InterfaceOperator
 from contactopt.solving.driver import solve
 
-KEPT = 3  # problems in memory
 NEIGHBOUR = 0.9  # load and friction of the problem whose solution is the warm start
-
-
-@dataclass(frozen=True, eq=False)
-class Built:
-    problem: InterfaceProblem
-    facts: dict[str, Any]  # the columns that it fills
+UNBUILT = (InputError, MemoryError, ArithmeticError, ValueError, np.linalg.LinAlgError)
+Note = Callable[[str], None]
 
 
 class Runner:
-    """Executes tasks one after another; `note` is told what takes time, "build", "warm up", "solve", and a problem's facts."""
+    """Runs methods, one request after another. It keeps the last problem, its warm start, and what is imported.
 
-    def __init__(self, note: Callable[[Any], None]):
+    A method's first run in a process is preceded by an untimed one on a problem of two contacts, so that imports and
+    compilation are not timed.
+    """
+
+    def __init__(self, note: Note):
         self.note = note
-        self.built: OrderedDict[str, Built | InputError] = OrderedDict()
-        self.starts: dict[str, Solution] = {}
+        self.problem: InterfaceProblem
+        self.start: Solution | None = None
         self.warm: set[tuple[str, int]] = set()
 
-    def execute(self, task: Task) -> dict[str, Any]:
+    def execute(self, task: Task, problem: InterfaceProblem | None) -> dict[str, Any]:
+        """The answer to one task, on a new problem or the one kept."""
+        limit_memory(task.memory_limit)
         self.note("solve")
+        if problem is not None:
+            self.problem, self.start = problem, None
         load_plugins(task.plugins)
-        row = blank(task)
-        try:
-            built = self.build(task.run.problem, task.diagnose)
-            start = self.start(task.run.problem, built.problem) if task.run.start == "warm" else None
-        except (InputError, MemoryError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
-            return row | {"status": "not_built", "message": short(error)}
-        problem = built.problem
-        row |= built.facts
-        try:
-            row["backend"] = task.run.method.backends(problem.dim)
-        except InputError as error:
-            return row | {"status": "refused", "message": short(error)}
-        if task.warm_up:
-            self.warm_up(task, problem.dim)
-        return row | measure(task, problem, start)
-
-    def build(self, spec: ProblemSpec, diagnosed: bool) -> Built:
-        if spec.label not in self.built:
-            self.note("build")
-            while len(self.built) >= KEPT:
-                self.starts.pop(self.built.popitem(last=False)[0], None)
-            begin = time.perf_counter()
+        start = None
+        if task.run.start == "warm":
             try:
-                problem = spec.build()
-            except InputError as error:
-                self.built[spec.label] = error
-            else:
-                facts = sizes(problem) | {"build_seconds": time.perf_counter() - begin}
-                facts |= diagnosis(problem) if diagnosed else {}
-                self.built[spec.label] = Built(problem, facts)
-                self.note(facts)  # known outside even if the run never returns
-            self.note("solve")
-        known = self.built[spec.label]
-        if isinstance(known, InputError):
-            raise known
-        return known
+                start = self.warm_start()
+            except UNBUILT as error:
+                return no_answer("not_built", error)
+        if task.warm_up:
+            self.warm_up(task, self.problem.dim)
+        return measure(task, self.problem, start)
 
-    def start(self, spec: ProblemSpec, problem: InterfaceProblem) -> Solution:
+    def warm_start(self) -> Solution:
         """The certified solution of the same problem at NEIGHBOUR times its load and friction."""
-        if spec.label not in self.starts:
-            self.note("build")
+        if self.start is None:
+            self.note("neighbour")
+            problem = self.problem
             q, s = (problem.q, NEIGHBOUR * problem.s) if len(problem.s) else (NEIGHBOUR * problem.q, problem.s)
-            solution = solve(replace(problem, law=problem.law.times(NEIGHBOUR), q=q, s=s))
-            if not solution.solved:
-                raise InputError(f"no warm start: {solution.message}")
-            self.starts[spec.label] = solution
+            self.start = solve(replace(problem, law=problem.law.times(NEIGHBOUR), q=q, s=s))
             self.note("solve")
-        return self.starts[spec.label]
+        if not self.start.solved:
+            raise InputError(f"no warm start: {self.start.message}")
+        return self.start
 
     def warm_up(self, task: Task, dim: int) -> None:
         mark = (task.run.method.label, dim)
@@ -112,9 +91,25 @@ class Runner:
         self.note("solve")
 
 
-def sizes(problem: InterfaceProblem) -> dict[str, Any]:
-    size = {"contacts": problem.contacts, "dim": problem.dim, "plates": len(problem.s)}
-    return {"fingerprint": problem.fingerprint, **size}
+def build(spec: ProblemSpec, plugins: tuple[str, ...], diagnosed: bool, memory_limit: float) -> dict[str, Any]:
+    """The problem with the seconds that it took and its diagnosis, or {"error": sentence}."""
+    limit_memory(memory_limit)
+    try:
+        load_plugins(plugins)
+        begin = time.perf_counter()
+        problem = spec.build()
+        seconds = time.perf_counter() - begin
+        if isinstance(problem.Q, InterfaceOperator):
+            raise InputError(
+                f"problem '{spec.label}' must have Q as a matrix; a benchmark hands it to other processes."
+            )
+        return {
+            "problem": problem,
+            "build_seconds": seconds,
+            "diagnosis": diagnosis(problem) if diagnosed else {},
+        }
+    except (Exception, SystemExit) as error:
+        return {"error": one_line(error)}
 
 
 def diagnosis(problem: InterfaceProblem) -> dict[str, float]:
@@ -149,14 +144,31 @@ def limit_memory(gigabytes: float) -> None:
             resource.setrlimit(kind, (size, resource.getrlimit(kind)[1]))
 
 
+def _serve_inspect(note: Note) -> Callable[..., Any]:
+    from contactopt.benchmark.catalogue import declare
+
+    return declare
+
+
+ROLES: dict[str, Callable[[Note], Callable[..., Any]]] = {
+    "inspect": _serve_inspect,
+    "build": lambda note: build,
+    "solve": lambda note: Runner(note).execute,
+}
+
+
 def main() -> None:
+    """Serve requests (word, *arguments) with messages (word, "phase" or "answer", content) until the socket closes."""
     die_with_parent(int(sys.argv[2]))
-    pipe = Connection(int(sys.argv[1]))
-    runner = Runner(pipe.send)
+    channel, own = Channel(socket.socket(fileno=int(sys.argv[1]))), os.getpid()
+    word = ""
+    serve = ROLES[sys.argv[3]](lambda phase: channel.send((word, "phase", phase)))
     while True:
         try:
-            task = pipe.recv()
+            word, *arguments = channel.wait()
         except (EOFError, OSError):
             return
-        limit_memory(task.memory_limit)
-        pipe.send(runner.execute(task))
+        answer = serve(*arguments)
+        if os.getpid() != own:  # a copy that the method made of this process by forking, and forgot
+            os._exit(1)
+        channel.send((word, "answer", answer))

@@ -4,7 +4,7 @@ Quadratic shape functions N_j cannot weigh contact forces themselves: on the fac
 symmetry, their integrals vanish at the vertices. So the contact surface is covered by linear cells with hat functions
 phi_i and nodal areas A_i = int phi_i > 0, and their nodes are the contacts: the halves and quarters of the faces of
 quadrilaterals and hexahedra, the whole faces of triangles and tetrahedra, whose forces at vertices and edges would
-alternate (experiments.elements). A contact force r_i acts on the nodes j by r_i W_ij, the displacement at contact i is
+alternate (experiments.questions.elements). A contact force r_i acts on the nodes j by r_i W_ij, the displacement at contact i is
 W_ij u_j,
 
     W_ij = int psi_i N_j / A_i,    psi_i linear on each cell,  int psi_i phi_j = delta_ij A_i   (dual basis).
@@ -163,6 +163,16 @@ def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, wei
     W.eliminate_zeros()
     corners = rows.reshape(-1, rows.shape[2]).T
     return Trace(nodes, areas, _clean(normals), W, corners)  # exact axes stay exact
+
+
+def face_nodes(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (face, j) of the faces of a boundary, corners first in cyclic order, and mean outward normals (dim, face)."""
+    name = basis.mesh.refdom.__name__
+    shape, places = SHAPES[name][1][degree](), FACES[name][2]
+    if degree == 1:
+        places = places[:, : FACES[name][1].doflocs.shape[0]]
+    at = _face_basis(basis.mesh, shape, boundary, (places, np.ones(places.shape[1])))
+    return _face_shapes(at, shape, boundary, places)[1], np.asarray(at.normals).mean(axis=2)
 
 
 def _cell_rule(

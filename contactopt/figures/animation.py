@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +9,7 @@ import numpy as np
 
 from contactopt.analysis.paths import PathResult
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE, contact_line
+from contactopt.files import whole_file
 
 FRAMES = 10  # per second
 
@@ -66,7 +65,7 @@ def animate(path: PathResult, file: str | Path) -> None:
     left, right = figure.subplots(1, 2)
     problem, scene = path.reduction.problem, path.states[-1].scene
     line = contact_line(problem)
-    x, area = problem.coordinates[0, line], problem.areas[line]
+    x, area = problem.chart.places[0, line], problem.areas[line]
     bound = [problem.mu[line] * np.abs(s.solution.reactions[line, 0]) / area for s in path.states]
     shear = [-s.solution.reactions[line, 1] / area for s in path.states]
     peak = float(np.max(bound))
@@ -95,11 +94,9 @@ def animate(path: PathResult, file: str | Path) -> None:
         point.set_data(across[state : state + 1], force[state : state + 1])
         return upper, lower, traction, past, point
 
-    file = Path(file)
     film = FuncAnimation(figure, draw, frames=len(path.states))
-    with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=file.parent) as staging:
-        film.save(Path(staging) / "film.gif", writer=PillowWriter(fps=FRAMES), dpi=80)
-        os.replace(Path(staging) / "film.gif", file)
+    with whole_file(file) as beside:
+        film.save(beside, writer=PillowWriter(fps=FRAMES), dpi=80)
 
 
 def _loop(path: PathResult) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:

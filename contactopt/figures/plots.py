@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.zone import contact_area, contact_half_width, pressed, stuck
+from contactopt.analysis.edges import contact_area, contact_edge
+from contactopt.analysis.status import contact_status
 from contactopt.interface.recovery import Fields
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.scenes.scene import Scene
@@ -30,6 +31,8 @@ def magnification(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fiel
         return 1.0
     size = _reach(scene, fields) or max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
     target = 0.08 * size / displacement
+    if not 1.0 < target < np.inf:  # also where displacements are beyond all numbers
+        return 1.0
     power = 10.0 ** np.floor(np.log10(target))
     return float(max(1.0, power * max(m for m in (1, 2, 5) if m * power <= target)))
 
@@ -38,26 +41,48 @@ def deformed(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], 
     """Deformed bodies coloured by von Mises stress, mirrored to the whole section (paper, figures 1 and 2)."""
     scale = magnification(scene, problem, fields)
     top = float(np.quantile(np.concatenate([f.von_mises for f in fields]), 0.998)) or 1.0
-    draw = _draw_solid if scene.dim == 3 else _draw_section
-    ax = draw(scene, fields, scale, top, ax)
+    if scene.dim == 3:
+        ax = _draw_solid(scene, fields, scale, top, ax)
+    else:
+        ax = _draw_section(scene, fields, scale, top, ax, mirror_plane(scene, problem))
     times = f", displacements x {scale:g}" if scale != 1 else ""
     ax.set_title(f"{scene.name}: deformed bodies, {scene.friction}{times}")
     return ax
 
 
-def _draw_section(scene: Scene, fields: Sequence[Fields], scale: float, top: float, ax: Any) -> Any:
+def mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] | None:
+    """Coordinate axis of a plane section and place on it beyond which the bodies are mirrored; None: they are whole.
+
+    It is the axis of revolution, or the plane of symmetry of a half model: that cuts the contact line at the origin of
+    its chart, across the line.
+    """
+    if scene.kind == "axisymmetric":
+        return 0, 0.0
+    chart, x = problem.chart, problem.coordinates
+    if scene.copies != 2 or not chart.mirrored[0] or len(x) != 2:
+        return None
+    nearest = np.argsort(np.abs(chart.places[0]))[:2]
+    axis = int(np.argmax(np.abs(np.diff(x[:, nearest], axis=1))))
+    return axis, float(x[axis, nearest[0]])
+
+
+def _draw_section(
+    scene: Scene, fields: Sequence[Fields], scale: float, top: float, ax: Any, plane: tuple[int, float] | None
+) -> Any:
     ax = _axes(ax)
+    axis, place = plane or (0, 0.0)
     for f in fields:
         points = f.mesh.p + scale * f.displacement
         corners = f.mesh.t.T
         cells = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]) if corners.shape[1] == 4 else corners
-        for mirror in (1, -1) if _half_model(scene, fields) else (1,):
-            colours = ax.tripcolor(
-                mirror * points[0], points[1], cells, f.von_mises, shading="gouraud", cmap="viridis", vmin=0, vmax=top
-            )
-            outline = f.mesh.facets[:, f.mesh.boundary_facets()]
-            outline = outline[:, ~np.all(np.isclose(f.mesh.p[0][outline], 0.0), axis=0)] if mirror else outline
-            ax.plot(mirror * points[0][outline], points[1][outline], color="black", lw=0.6)
+        outline = f.mesh.facets[:, f.mesh.boundary_facets()]
+        if plane is not None:  # the plane of symmetry is no edge of the whole body
+            outline = outline[:, ~np.all(np.isclose(f.mesh.p[axis][outline], place), axis=0)]
+        for image in (False, True) if plane is not None else (False,):
+            x = points.copy()
+            x[axis] = 2 * place - x[axis] if image else x[axis]
+            colours = ax.tripcolor(*x, cells, f.von_mises, shading="gouraud", cmap="viridis", vmin=0, vmax=top)
+            ax.plot(x[0][outline], x[1][outline], color="black", lw=0.6)
     across, up = scene.components
     ax.set(xlabel=f"{across} [{scene.units[0]}]", ylabel=f"{up} [{scene.units[0]}]", aspect="equal")
     reach = _reach(scene, fields)
@@ -77,10 +102,6 @@ def _reach(scene: Scene, fields: Sequence[Fields]) -> float | None:
 def _singular(scene: Scene) -> bool:
     """Whether tractions are known to be infinite somewhere, so that the largest nodal value means nothing."""
     return scene.reference is not None and scene.reference.peak is None
-
-
-def _half_model(scene: Scene, fields: Sequence[Fields]) -> bool:
-    return scene.kind == "axisymmetric" or (scene.copies == 2 and min(float(f.mesh.p[0].min()) for f in fields) >= 0)
 
 
 def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float, ax: Any) -> Any:
@@ -126,8 +147,8 @@ def _in_cycle(facets: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def contact_line(problem: InterfaceProblem) -> np.ndarray:
-    """Contact nodes along the first axis, sorted; in 3D those of the row nearest y = 0."""
-    x = problem.coordinates
+    """Contact nodes along the first direction of the surface, in order; in 3D those of the row nearest to its origin."""
+    x = problem.chart.places
     row = np.ones(x.shape[1], dtype=bool)
     if problem.dim == 3:
         nearest = np.abs(x[1]).min()
@@ -140,9 +161,9 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     """Contact pressure over its mean against position over half-width (paper, figure 3), with the exact curve."""
     ax = _axes(ax)
     line = contact_line(problem)
-    x = problem.coordinates[0, line]
+    x = problem.chart.places[0, line]
     p = solution.reactions[line, 0] / problem.areas[line]
-    a = contact_half_width(scene, problem, solution.reactions)
+    a = contact_edge(scene, problem, solution.reactions)
     mean = solution.reactions[:, 0].sum() / contact_area(scene, a) if a > 0 else 0.0
     a, mean = a or 1.0, mean or 1.0
     ax.plot(x / a, p / mean, "o-", color=BLUE, ms=4, lw=1, label="contactopt")
@@ -166,11 +187,10 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     """Tangential traction against position with the friction bound; sticking and slipping nodes marked."""
     ax = _axes(ax)
     line = contact_line(problem)
-    x = problem.coordinates[0, line]
+    x = problem.chart.places[0, line]
     t = solution.reactions[line, 1] / problem.areas[line]
     bound = problem.mu[line] * np.abs(solution.reactions[line, 0]) / problem.areas[line]
-    touching = pressed(solution.reactions)[line]
-    sticking = stuck(solution.reactions, problem.mu)[line]
+    status = contact_status(problem, solution.reactions)
     ax.plot(x, bound, color=GREY, lw=1, ls="--", label="friction bound, +/- mu p")
     ax.plot(x, -bound, color=GREY, lw=1, ls="--")
     ax.plot(x, t, color=BLUE, lw=1)
@@ -183,8 +203,8 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     if _singular(scene) and np.any(bound):
         mean = float(np.average(bound, weights=problem.areas[line]))
         ax.set_ylim(-5 * mean, 5 * mean)
+    sticking, slipping = status.stick[line], status.slip[line]
     ax.plot(x[sticking], t[sticking], "o", color=BLUE, ms=5, label="stick")
-    slipping = touching & ~sticking
     ax.plot(x[slipping], t[slipping], "s", color=ORANGE, ms=5, mfc="white", label="slip")
     across = scene.components[0]
     where = ", y = 0" if problem.dim == 3 else ""
@@ -198,12 +218,12 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
 def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
     """Contact patch of a 3D scene: sticking, slipping and open nodes, with the tangential traction as arrows."""
     ax = _axes(ax)
-    x, y = problem.coordinates[:2]
-    touching, sticking = pressed(solution.reactions), stuck(solution.reactions, problem.mu)
+    x, y = problem.chart.places
+    status = contact_status(problem, solution.reactions)
     for mask, colour, marker, label in (
-        (sticking, BLUE, "o", "stick"),
-        (touching & ~sticking, ORANGE, "s", "slip"),
-        (~touching, GREY, "x", "open"),
+        (status.stick, BLUE, "o", "stick"),
+        (status.slip, ORANGE, "s", "slip"),
+        (status.open, GREY, "x", "open"),
     ):
         if mask.any():
             face = {} if marker == "x" else {"facecolors": colour if marker == "o" else "white"}

@@ -1,6 +1,6 @@
 """The choice between the forms of Q by their cost, with every number that it rests on.
 
-`python -m experiments.form_of_q` measures PRODUCTS, SOLVE, DENSE and the entries of the factors on punches of growing size,
+`python -m experiments.questions.form_of_q` measures PRODUCTS, SOLVE, DENSE and the entries of the factors on punches of growing size,
 and the table of costs of `python -m experiments.preconditioners` shows where the two forms cost the same. LARGEST is not
 fitted but chosen: an array of half a gigabyte.
 """

@@ -30,6 +30,11 @@ COUPLINGS = {
         "couple_nodes",
         "contacts are the nodes of a body, whose partners on the other body lie on the same normals",
     ),
+    "mortar": (
+        "contactopt.interface.surfaces",
+        "couple_surfaces",
+        "contacts are the nodes of the finer surface, displacements are averaged where the surfaces overlap",
+    ),
 }
 
 

@@ -177,7 +177,7 @@ def _operator(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], coupling: C
     def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
         return np.asarray(sum(each(lambda term: term[0](X, accuracy), terms, parallel), np.zeros(X.shape)))
 
-    weights = nodal_weights(coupling.chart.places, coupling.areas, coupling.frames.shape[1])
+    weights = nodal_weights(coupling.chart, coupling.areas)
     diagonal = estimate_diagonal(product, weights, np.any(moved, axis=0))
     complete, iterative = all(body.complete for body in bodies), any(body.iterative for body in bodies)
     entries = (lambda: _array(bodies, maps)) if complete else None

@@ -3,8 +3,9 @@
 Nothing here, or below in what it imports, knows finite elements.
 """
 
-from contactopt.problem.certificate import balance_residual, fit_multipliers, natural_map_residual
+from contactopt.problem.certificate import balance_residual, fit_multipliers, natural_map_residual, siconos_residual
 from contactopt.problem.chart import Chart
+from contactopt.problem.feasibility import Infeasible, infeasibility
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.laws import LAWS, Law
 from contactopt.problem.scaling import Scales, dimensionless
@@ -13,6 +14,7 @@ from contactopt.problem.solution import Solution, Status
 __all__ = [
     "LAWS",
     "Chart",
+    "Infeasible",
     "InterfaceProblem",
     "Law",
     "Scales",
@@ -21,5 +23,7 @@ __all__ = [
     "balance_residual",
     "dimensionless",
     "fit_multipliers",
+    "infeasibility",
     "natural_map_residual",
+    "siconos_residual",
 ]

@@ -8,6 +8,8 @@ import numpy as np
 
 from contactopt.errors import InputError
 
+ON_PLANE = 1e-9  # a contact nearer than this fraction of the largest place lies on the plane of symmetry
+
 
 @dataclass(frozen=True, eq=False)
 class Chart:
@@ -55,3 +57,43 @@ class Chart:
         axes = np.pad(axes, ((0, 0), (0, count - axes.shape[1])))
         largest = axes[np.argmax(np.abs(axes), axis=0), np.arange(count)]
         return cls((axes * np.where(largest < 0, -1.0, 1.0)).T @ centred, (False,) * count)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the surface is a contact line that returns to its start."""
+        return self.period is not None
+
+    def order(self) -> np.ndarray:
+        """The contacts (k,) in their order along a contact line; on a surface, along its first direction."""
+        return np.argsort(self.places[0], kind="stable")
+
+    def offsets(self, contact: int) -> np.ndarray:
+        """Places (dim - 1, k) relative to one contact; on a closed line the shorter way round [length]."""
+        apart = self.places - self.places[:, [contact]]
+        return apart if self.period is None else (apart + self.period / 2) % self.period - self.period / 2
+
+    def images(self) -> tuple[np.ndarray, np.ndarray]:
+        """The whole surface: places (dim - 1, m) with those of all mirror images, and the contact (m,) of each.
+
+        A contact on a plane of symmetry or on an axis is its own image and stands there once.
+        """
+        x, contact = self.places, np.arange(self.places.shape[1])
+        near = ON_PLANE * np.abs(x).max(initial=0.0)
+        for axis in np.flatnonzero(self.mirrored):
+            other = np.abs(x[axis]) > near
+            image = x[:, other] * np.where(np.arange(len(x)) == axis, -1.0, 1.0)[:, None]
+            x, contact = np.hstack([x, image]), np.append(contact, contact[other])
+        return x, contact
+
+    def spacing(self) -> np.ndarray:
+        """Distance (k,) between the two neighbours of every contact of a line, at an end to the only one [length]."""
+        order = self.order()
+        steps, spacing = np.diff(self.places[0, order]), np.empty(len(order))
+        if self.period is not None:
+            steps = np.append(steps, self.period - steps.sum())
+            spacing[order] = steps + np.roll(steps, 1)
+        elif len(steps):
+            spacing[order] = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
+        else:
+            spacing[order] = 1.0
+        return spacing

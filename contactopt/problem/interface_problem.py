@@ -15,51 +15,77 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.problem.laws import Law
 from contactopt.problem.laws.coulomb import Coulomb
-from contactopt.problem.operators import Interface, InterfaceOperator
+from contactopt.problem.operators import Interface, InterfaceOperator, asymmetry, dense, diagonal, row_sizes, sparse
+
+SYMMETRIC = 1e-2  # largest |Q - Q'|, over the largest |Q|, that counts as rounding of the code that wrote Q
 
 logger = logging.getLogger(__name__)
 
 LARGEST = 8e9  # bytes of a Q that is formed in full from its products
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class InterfaceProblem:
     """Contact at k nodes in `dim` dimensions, as in the head of this module.
 
-    Q            (k dim, k dim) compliance, symmetric positive semidefinite [length / force]: an array, or an
-                 InterfaceOperator that knows it by its products only
+    Q            (k dim, k dim) compliance [length / force]: an array, a scipy sparse matrix (kept as csr_array), or an
+                 InterfaceOperator that knows it by its products only. Elastic bodies make it symmetric positive
+                 semidefinite; files of other codes may hold an unsymmetric one, which is solved as it stands by the
+                 methods that need no symmetry (`symmetric`)
     q            (k, dim) displacement at r = 0, lambda = 0 [length]; q_n holds the initial gap
-    law          a Law of contactopt.problem.laws, or friction coefficients mu, one number or (k,), which mean Coulomb's law
+    law          a Law of contactopt.problem.laws, or friction coefficients, one number or (k,), which mean Coulomb's law;
+                 the keyword `mu` may be given in its place
     V, s         (k dim, p) rigid motions and (p,) resultants [force]; p = 0 without a plate
     areas        (k,) nodal areas, force / area = traction; ones by default
     coordinates  (d, k) positions of the nodes in space, for output only; 0, 1, 2, ... by default
     chart        the nodes' places on the contact surface; by default read from the coordinates (Chart.of_points)
-    Raises InputError on wrong shapes, numbers that are not finite or not real, negative mu, V without s, an unsymmetric Q or one with a negative
-    diagonal (an indefinite Q is not looked for: its answers are certified like any other; an operator is taken at its
-    word).
+    Raises InputError on wrong shapes, numbers that are not finite or not real, negative mu, V without s, or a Q with a
+    negative diagonal (an indefinite Q is not looked for: its answers are certified like any other; an operator is taken at
+    its word).
     """
 
     Q: Interface
     q: np.ndarray
     law: Law
-    V: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    s: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    areas: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    coordinates: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    chart: Chart = None  # type: ignore[assignment]
+    V: np.ndarray
+    s: np.ndarray
+    areas: np.ndarray
+    coordinates: np.ndarray
+    chart: Chart
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        Q: Any,
+        q: Any,
+        law: Any = None,
+        V: Any = (),
+        s: Any = (),
+        areas: Any = (),
+        coordinates: Any = (),
+        chart: Chart | None = None,
+        *,
+        mu: Any = None,
+    ):
+        if (law is None) == (mu is None):
+            raise InputError("give either a law or a friction coefficient mu.")
+        given = {"Q": Q, "q": q, "law": mu if law is None else law, "V": V, "s": s, "areas": areas}
+        for name, value in (given | {"coordinates": coordinates, "chart": chart}).items():
+            object.__setattr__(self, name, value)
+        self._check()
+
+    def _check(self) -> None:
         q = np.atleast_2d(real_array("q", self.q))
         k, dim = q.shape if q.ndim == 2 else (len(q), 0)
         if dim not in (2, 3):
@@ -79,12 +105,12 @@ class InterfaceProblem:
             "coordinates": (places, (len(places), k)),
         }
         for name, (value, shape) in arrays.items():
-            array = self.Q if name == "Q" and implicit else real_array(name, value)
+            array = self.Q if name == "Q" and implicit else _numbers(name, value)
             if array.shape != shape:
                 raise InputError(f"{name} must have shape {shape}; got {array.shape}.")
             if array is self.Q:
                 continue
-            array.setflags(write=False)
+            (array.data if sp.issparse(array) else array).setflags(write=False)
             object.__setattr__(self, name, array)
         if self.chart is None:
             object.__setattr__(self, "chart", Chart.of_points(self.coordinates, dim))
@@ -92,9 +118,7 @@ class InterfaceProblem:
             raise InputError(f"the chart must have places of shape {(dim - 1, k)}; got {self.chart.places.shape}.")
         if isinstance(self.Q, InterfaceOperator):
             return
-        if np.abs(self.Q - self.Q.T).max(initial=0.0) > 1e-2 * np.abs(self.Q).max(initial=0.0):
-            raise InputError("Q must be symmetric (to 1 %); check the order of its rows and columns.")
-        if np.diag(self.Q).min(initial=0.0) < -1e-12 * np.abs(self.Q).max(initial=0.0):
+        if diagonal(self.Q).min(initial=0.0) < -1e-12 * row_sizes(self.Q).max(initial=0.0):
             raise InputError("Q must be positive semidefinite, but it has a negative diagonal entry; check its sign.")
 
     @property
@@ -111,18 +135,27 @@ class InterfaceProblem:
         return self.law.coefficient
 
     @cached_property
+    def symmetric(self) -> bool:
+        """Whether Q is symmetric to 1 %: methods that minimise an energy need it, and use (Q + Q') / 2."""
+        return asymmetry(self.Q) <= SYMMETRIC
+
+    @cached_property
     def fingerprint(self) -> str:
         """Digest of the problem's data, for caching and for naming it in tables."""
         digest = hashlib.sha256(self.law.digest)
         implicit = isinstance(self.Q, InterfaceOperator)
-        probe = self.Q @ np.random.default_rng(0).normal(size=self.q.size) if implicit else self.Q
-        for array in (probe, self.q, self.V, self.s):
+        if implicit:
+            known = [self.Q @ np.random.default_rng(0).normal(size=self.q.size)]
+        else:  # the same for an array and for sparse rows
+            rows = sparse(self.Q)
+            known = [rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data]
+        for array in (*known, self.q, self.V, self.s):
             digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()[:16]
 
     def explicit(self) -> InterfaceProblem:
         """The same problem with Q an array; InputError if that is larger than LARGEST bytes."""
-        if not isinstance(self.Q, InterfaceOperator):
+        if isinstance(self.Q, np.ndarray):
             return self
         size = 8 * self.q.size**2
         if size > LARGEST:
@@ -131,8 +164,20 @@ class InterfaceProblem:
                 "use the method 'newton', or 'alternating' with the backend 'pcg', which need products with Q only."
             )
         logger.info("forming Q in full: %d unknowns, %.3g MB", self.q.size, size / 1e6)
-        return replace(self, Q=self.Q.to_dense())
+        return replace(self, Q=dense(self.Q))
 
     def displacements(self, reactions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """u = Q r + V lambda + q, (k, dim) [length]."""
         return (self.Q @ reactions.ravel() + self.V @ multipliers).reshape(self.q.shape) + self.q
+
+
+def _numbers(name: str, value: Any) -> Any:
+    """The value as a real finite array of its own, or a sparse Q as sparse rows; InputError if it is neither."""
+    if name != "Q" or not sp.issparse(value):
+        return real_array(name, value)
+    if np.iscomplexobj(value):
+        raise InputError("Q must be real; got complex numbers.")
+    rows = sparse(value)
+    if not np.all(np.isfinite(rows.data)):
+        raise InputError("Q holds a number that is not finite.")
+    return rows

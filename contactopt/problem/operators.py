@@ -1,18 +1,22 @@
 """The interface operator Q known by its products: what every method needs that never looks at an entry of Q.
 
 A product costs one solve per body; the entries of Q cost one per interface unknown. Methods that need them ask for
-`dense(Q)`. All functions here take both forms of Q, an array and an InterfaceOperator.
+`dense(Q)`. All functions here take the three forms of Q: an array, a scipy sparse matrix in compressed rows (csr_array),
+and an InterfaceOperator.
 """
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from typing import Any, TypeAlias
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator
 
 from contactopt.errors import InputError
+from contactopt.problem.chart import Chart
 
 log = logging.getLogger(__name__)
 
@@ -116,7 +120,15 @@ class InterfaceOperator(LinearOperator):
         return part
 
 
-Interface = np.ndarray | InterfaceOperator
+Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or InterfaceOperator
+
+
+def sparse(Q: object) -> sp.csr_array:
+    """Any scipy sparse matrix as compressed rows of floats with sorted columns, duplicates summed, in memory of its own."""
+    rows = sp.csr_array(Q, dtype=float, copy=True)
+    rows.sum_duplicates()
+    rows.eliminate_zeros()
+    return rows
 
 
 def check_dense(n: int) -> None:
@@ -139,25 +151,49 @@ def check_dense(n: int) -> None:
 
 def dense(Q: Interface) -> np.ndarray:
     """Q as an array (n, n)."""
-    return Q.to_dense() if isinstance(Q, InterfaceOperator) else Q
+    if isinstance(Q, InterfaceOperator):
+        return Q.to_dense()
+    return np.asarray(Q.toarray()) if sp.issparse(Q) else Q
 
 
 def diagonal(Q: Interface) -> np.ndarray:
     """The diagonal of Q (n,), or the operator's estimate of it."""
-    return Q.diagonal if isinstance(Q, InterfaceOperator) else np.diag(Q)
+    if isinstance(Q, InterfaceOperator):
+        return Q.diagonal
+    return np.asarray(Q.diagonal())
+
+
+def row_sizes(Q: np.ndarray | sp.csr_array) -> np.ndarray:
+    """(n,) largest |Q_ij| of each row."""
+    if sp.issparse(Q):
+        return np.asarray(abs(Q).max(axis=1).toarray()).ravel() if Q.shape[0] else np.zeros(0)
+    return np.asarray(np.abs(Q).max(axis=1, initial=0.0))
+
+
+def asymmetry(Q: Interface) -> float:
+    """max |Q - Q'| / max |Q| [-]; an operator is symmetric."""
+    if isinstance(Q, InterfaceOperator):
+        return 0.0
+    if sp.issparse(Q):
+        size = float(np.abs(Q.data).max(initial=0.0))
+        return float(np.abs((Q - Q.T).data).max(initial=0.0)) / size if size > 0 else 0.0
+    size = float(np.abs(Q).max(initial=0.0))
+    return float(np.abs(Q - Q.T).max(initial=0.0)) / size if size > 0 else 0.0
 
 
 def held(Q: Interface) -> np.ndarray:
     """(n,) mask of the components that cannot move: coupled to no other component."""
     if isinstance(Q, InterfaceOperator):
         return Q.held
-    size = np.abs(Q)
-    coupling = size.sum(axis=1) - np.diag(size)
-    return np.asarray(coupling <= NOISE * size.max(initial=0.0))
+    size = abs(Q)
+    coupling = np.asarray(size.sum(axis=1)).ravel() - size.diagonal()
+    return np.asarray(coupling <= NOISE * row_sizes(Q).max(initial=0.0))
 
 
 def shifted(Q: Interface, added: np.ndarray) -> Interface:
     """Q + diag(added), added (n,); products count with those of Q."""
+    if sp.issparse(Q):
+        return sp.csr_array(Q + sp.diags_array(added))
     if not isinstance(Q, InterfaceOperator):
         return Q + np.diag(added)
     sum_ = Q.scaled(1.0, added)
@@ -167,6 +203,8 @@ def shifted(Q: Interface, added: np.ndarray) -> Interface:
 
 def block(Q: Interface, unknowns: np.ndarray) -> Interface:
     """Q on some unknowns alone."""
+    if sp.issparse(Q):
+        return sp.csr_array(Q[unknowns][:, unknowns])
     return Q.block(unknowns) if isinstance(Q, InterfaceOperator) else Q[np.ix_(unknowns, unknowns)]
 
 
@@ -176,22 +214,25 @@ def loosened(Q: Interface, accuracy: float) -> Interface:
     return Q.loosened(accuracy) if isinstance(Q, InterfaceOperator) and Q.inexact else Q
 
 
-def nodal_weights(coordinates: np.ndarray, areas: np.ndarray, dim: int) -> np.ndarray:
-    """(k,) w with diag(Q) about proportional to 1 / w^2 at each contact, mean of w^2 one.
+def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
+    """Weights w (k,) of the contacts with diag(Q) about proportional to 1 / w^2; the mean of w^2 is one.
 
-    A force spread over a node's area makes a displacement that goes with 1 / length of the contact line there (2D) or with
-    1 / square root of the area (3D): w^2 = area / spacing along a line, sqrt(area) on a surface.
+    A force that is spread over the area of a node makes a displacement proportional to 1 / length of the contact line
+    there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area / spacing on a line, sqrt(area) on a surface.
+
+    Parameters
+    ----------
+    chart : the k contacts on their surface [length]
+    areas : (k,) nodal areas
     """
-    if dim == 3:
+    if len(chart.places) == 2:
         square = np.sqrt(areas)
     else:
-        order = np.argsort(coordinates[0])
-        steps = np.diff(coordinates[0, order])
-        spacing = np.empty(len(areas))
-        spacing[order] = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]]) if len(steps) else 1.0
+        spacing = chart.spacing()
         square = areas / np.where(spacing > 0, spacing, 1.0)
     positive = square[square > 0]
-    square = np.maximum(square, 1e-2 * np.mean(positive) if len(positive) else 1.0)  # the node on an axis has no area
+    # The node on an axis has no area; it gets a hundredth of the mean instead of an infinite diagonal.
+    square = np.maximum(square, 1e-2 * np.mean(positive) if len(positive) else 1.0)
     return np.sqrt(square / np.mean(square))
 
 

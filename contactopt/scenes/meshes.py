@@ -8,6 +8,8 @@ from skfem import MeshHex, MeshQuad, MeshTet, MeshTri
 
 from contactopt.errors import InputError
 
+MOST_CELLS = 2e7  # of one mesh
+
 
 def graded(length: float, first: float, growth: float) -> np.ndarray:
     """Grid from 0 to `length` whose spacing starts at about `first` and grows by a ratio of at most `growth`.
@@ -40,6 +42,9 @@ def contact_grid(half_width: float, elements: int, length: float, growth: float)
 
 def tensor_mesh(*grids: np.ndarray) -> MeshQuad | MeshHex:
     """Bricks on a tensor grid. Boundaries 'x-', 'x+', 'y-', 'y+' (, 'z-', 'z+'): the faces of the box."""
+    cells = np.prod([float(len(grid) - 1) for grid in grids])
+    if cells > MOST_CELLS:
+        raise InputError(f"a mesh of {cells:.0e} elements is more than {MOST_CELLS:.0e}; take fewer elements.")
     mesh = (MeshQuad if len(grids) == 2 else MeshHex).init_tensor(*grids)
     planes = {}
     for axis, (name, grid) in enumerate(zip("xyz", grids)):

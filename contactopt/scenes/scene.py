@@ -12,10 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.checks import check_number, real_array
+from contactopt.checks import check_name, check_number, real_array
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.problem.laws import find_law
+
+MOST_ELEMENTS = 100_000  # across the contact half-width
+LARGEST = 1e100  # of forces, stresses and lengths: the squares of larger ones are no numbers
 
 # The components of a displacement, in the order of the mesh coordinates.
 COMPONENTS = {"plane-strain": ("x", "y"), "axisymmetric": ("r", "z"), "solid": ("x", "y", "z")}
@@ -82,6 +85,7 @@ class Part:
     curve: Callable[[np.ndarray], np.ndarray] | None = None
 
     def __post_init__(self) -> None:
+        check_name("the body's name", self.name)  # of its VTU file
         if not isinstance(self.material, Material):
             raise InputError(f"body '{self.name}': its material must be a Material(E, nu); got {self.material!r}.")
 
@@ -155,6 +159,9 @@ class HalfSpace:
                 )
         return made
 
+    def __post_init__(self) -> None:
+        check_name("the body's name", self.name)
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -204,12 +211,16 @@ class Scene:
         for name, count in (("elements", self.elements), ("copies", self.copies)):
             if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
                 raise InputError(f"scene '{self.name}': {name} must be a whole number of at least 1; got {count!r}.")
+        if self.elements > MOST_ELEMENTS:
+            raise InputError(f"scene '{self.name}': elements must be at most {MOST_ELEMENTS}; got {self.elements}.")
         if self.degree not in (1, 2):
             raise InputError(
                 f"scene '{self.name}': the degree of the displacement must be 1 or 2; got {self.degree!r}."
             )
         if isinstance(self.upper, Rigid) and isinstance(self.lower, Rigid):
             raise InputError(f"scene '{self.name}': both bodies are rigid; at least one must be elastic.")
+        if self.upper.name == self.lower.name:
+            raise InputError(f"scene '{self.name}': both bodies are called '{self.upper.name}'; rename one.")
         for part in (self.upper, self.lower):
             self._check_part(part)
 
@@ -266,7 +277,7 @@ class Scene:
                 )
             else:
                 for value in load.value:
-                    check_number(f"every {type(load).__name__} value of body '{part.name}'", value)
+                    check_number(f"every {type(load).__name__} value of body '{part.name}'", value, -LARGEST, LARGEST)
 
     def _check_components(self, body: str, values: Mapping[str, float]) -> None:
         for component, value in values.items():
@@ -274,7 +285,7 @@ class Scene:
                 raise InputError(
                     f"body '{body}': there is no component {component!r}; use {', '.join(self.components)}."
                 )
-            check_number(f"the {component} value of body '{body}'", value)
+            check_number(f"the {component} value of body '{body}'", value, -LARGEST, LARGEST)
 
 
 def _check_friction(mu: Any) -> None:

@@ -8,10 +8,19 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.checks import check_number, real_array
 from contactopt.errors import BackendError, InputError
-from contactopt.problem import InterfaceProblem, Scales, Solution, Status, dimensionless, natural_map_residual
+from contactopt.problem import (
+    InterfaceProblem,
+    Scales,
+    Solution,
+    Status,
+    dimensionless,
+    infeasibility,
+    natural_map_residual,
+)
 from contactopt.problem.operators import InterfaceOperator, loosened
 from contactopt.solving.deadline import TimeUp, until
 from contactopt.solving.methods import Iterate, Method, default_method, find_method, solvers_of, solves
@@ -19,6 +28,8 @@ from contactopt.solving.notes import collected
 
 CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
+CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
+PROOF = 0.3, 5.0  # least and most seconds for the proof that a problem has no solution
 SAME = 1e-11  # relative distance at which two iterates are the same state
 CONFIRM = 8  # repeated states in a row after which a method is not going anywhere; some change course before that
 
@@ -46,7 +57,8 @@ def solve(
     start           a solution of a problem of the same size, to start from instead of cold
     progress        called with (iteration, residual) after each outer iteration
     Raises InputError on arguments that make no sense, an unknown or missing backend, a method that does not solve the
-    problem's law, or a load that pulls the bodies apart. A backend that fails while solving is a status, with the last iterate.
+    problem's law, or a load that pulls the bodies apart. A problem that has no solution ends `infeasible`, with a proof,
+    where one is found. A backend that fails while solving is a status, with the last iterate.
     """
     check_number("tol", tol, low=0.0)
     check_number("max_iterations", max_iterations, low=0.0)
@@ -91,7 +103,12 @@ def _run(
     if problem.contacts == 0:
         return _without_contacts(problem, method, tol)
     _check_equilibrium(problem)
-    if not getattr(method, "implicit", False):
+    if not problem.symmetric and not getattr(method, "unsymmetric", False):
+        name = type(method).__name__.lower()
+        raise InputError(
+            f"method '{name}' minimises an energy, which an unsymmetric Q does not have; use auto or proximal."
+        )
+    if not getattr(method, "sparse" if sp.issparse(problem.Q) else "implicit", False):
         problem = problem.explicit()
     scaled, scales = dimensionless(problem)
     recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)
@@ -106,6 +123,11 @@ def _run(
         if iterate is not None:
             ended = recorder.record(*iterate, {} if operator is None else {"products": operator.products})
     status = Status.SOLVED if recorder.residual <= tol else ended
+    proof = None
+    if status is not Status.SOLVED and recorder.residual > CLOSE:
+        proof = infeasibility(problem, float(np.clip(time_limit - recorder.clock, *PROOF)))
+        if proof is not None:
+            message, status = proof.sentence, Status.INFEASIBLE
     return Solution(
         recorder.reactions,
         recorder.multipliers,
@@ -116,6 +138,7 @@ def _run(
         tuple(recorder.history),
         {"solve": recorder.clock, "certificate": recorder.certified},
         message or status.sentence,
+        proof=proof,
     )
 
 
@@ -171,7 +194,8 @@ class _Recorder:
         self.reactions, self.multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
         self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
         self.history: list[dict[str, float]] = []
-        self.recent: list[np.ndarray] = [self.reactions]
+        self.previous = self.reactions
+        self.recent: list[np.ndarray] = [np.zeros(problem.q.size + len(problem.s))]
         self.clock, self.certified = 0.0, 0.0
         self.repeated = 0
 
@@ -190,9 +214,11 @@ class _Recorder:
         begin = time.perf_counter()
         self.residual = self._certificate()
         self.certified += time.perf_counter() - begin
-        change = _relative(self.reactions[:, 1:], self.recent[-1][:, 1:])
-        repeats = [m for m, old in enumerate(reversed(self.recent), 1) if _relative(self.reactions, old) < SAME]
-        self.recent = [*self.recent[1 - CYCLE :], self.reactions]
+        change = _relative(self.reactions[:, 1:], self.previous[:, 1:])
+        self.previous = self.reactions
+        state = np.concatenate([r.ravel(), lam])
+        repeats = [m for m, old in enumerate(reversed(self.recent), 1) if _relative(state, old) < SAME]
+        self.recent = [*self.recent[1 - CYCLE :], state]
         self.history.append({"residual": self.residual, "change": change, "seconds": self.clock} | counts)
         if self.progress is not None:
             self.progress(len(self.history), self.residual)

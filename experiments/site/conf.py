@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
+import docstrings
 import generate
 
 import contactopt
@@ -37,7 +38,7 @@ maximum_signature_line_length = 100
 
 def setup(app):
     """Register the reader of docstrings, and write the pages that are made from tables."""
-    app.connect("autodoc-process-docstring", lambda app, what, name, thing, options, lines: generate.as_rst(lines))
+    app.connect("autodoc-process-docstring", lambda app, what, name, thing, options, lines: docstrings.as_rst(lines))
     app.connect(
         "autodoc-process-signature",
         lambda app, what, name, thing, options, signature, returns: (

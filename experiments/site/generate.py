@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
-import importlib
 import inspect
 import os
 import re
@@ -13,9 +11,10 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-import contactopt
+import reference
+from reference import contents, index
+
 import contactopt.cli
-from contactopt.solving.methods import METHODS
 
 ROOT = Path(__file__).parents[2]
 # the order in which a course would take them
@@ -42,34 +41,6 @@ ACCURACY = (
     "qp_backends",
 )
 PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
-# module -> what its page is called; every public name that `contactopt` exports lives in one of them
-MODULES = {
-    "scene": "Scenes: what to model",
-    "scenes": "Named scenes",
-    "mesh": "Structured meshes",
-    "runner": "From a scene to files in one call",
-    "reduction": "Reduction to the interface",
-    "problem": "The interface problem and its certificate",
-    "driver": "Solving",
-    "warm": "Warm starts",
-    "diagnosis": "Diagnosis",
-    "enumeration": "All solutions of small problems",
-    "paths": "Load paths",
-    "animation": "Pictures of load paths",
-    "quantities": "Quantities whose accuracy can be asked for",
-    "models": "Convex programs in cvxpy",
-    "operators": "The interface operator by its products",
-    "preconditioners": "Preconditioners",
-    "factors": "Factors of the bodies",
-    "linear": "Solvers of the bodies",
-    "cones": "Cones and projections",
-    "recover": "Displacements and stresses",
-    "analytic": "Exact solutions",
-    "fclib": "FCLib files",
-    "plots": "Figures",
-    "benchmark": "Benchmarks",
-    "errors": "Errors",
-}
 
 
 def write_pages(site: Path) -> None:
@@ -95,16 +66,9 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     for name in ordered:
         yield Path("tutorials", f"{name}.py"), found[name]
     yield Path("tutorials.md"), index("Tutorials", TUTORIAL_TEXT, [f"tutorials/{name}" for name in ordered])
-    for name in METHODS:
-        yield Path("methods", f"{name}.md"), method_page(site, name)
-    table = "\n".join(f"| [{name}](methods/{name}.md) | {what} |" for name, (_, _, what) in METHODS.items())
-    text = f"{METHODS_TEXT}\n| method | what it is |\n|---|---|\n{table}\n"
-    yield Path("methods.md"), index("Methods", text, [f"methods/{name}" for name in METHODS], hidden=True)
+    yield from reference.plug_in_pages(site)
     yield Path("command_line.md"), command_line()
-    present = {name: title for name, title in MODULES.items() if importlib.util.find_spec(f"contactopt.{name}")}
-    for name, title in present.items():
-        yield Path("api", f"{name}.md"), module_page(name, title)
-    yield Path("api.md"), index("Reference", reference_table(), [f"api/{name}" for name in present])
+    yield from reference.room_pages(ROOT)
     reports = {name_of(path): path for path in sorted((ROOT / "reports").glob("*/report.md"))}
     reports |= {name_of(path): path for path in sorted((ROOT / "reports").glob("*.md"))}
     about = [name for name in ACCURACY if name in reports]
@@ -118,11 +82,8 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
                 yield Path("reports", base(path), picture[1]), path.parent / picture[1]
 
 
-TUTORIAL_TEXT = """Each is a script, a notebook (open the file in Jupyter with jupytext, or in VS Code) and this page,
-about ten minutes to read. All claims are asserted; exercises hide their solutions.
-"""
-METHODS_TEXT = """Every method is called by name, `contactopt.solve(problem, "newton")`, and every answer of every method
-gets the same certificate. Letters and signs are those of [the mathematics](../mathematics.md).
+TUTORIAL_TEXT = """Each tutorial is a script, a notebook (open the file in Jupyter with jupytext, or in VS Code) and a page of
+this site. It takes about ten minutes to read. Every claim is asserted in its code, and the exercises have hidden solutions.
 """
 
 
@@ -135,48 +96,6 @@ def command_line() -> str:
         command.formatter_class = partial(argparse.HelpFormatter, width=100)
         pages.append(f"## contactopt {name}\n\n```text\n{command.format_help()}```\n")
     return "\n".join(pages)
-
-
-def index(title: str, text: str, pages: list[str], hidden: bool = False) -> str:
-    """A page with a table of contents below its text."""
-    return f"# {title}\n\n{text}{contents(pages, hidden)}"
-
-
-def contents(pages: list[str], hidden: bool) -> str:
-    """A table of contents; hidden: in the sidebar only."""
-    listed = "\n".join(pages)
-    return f"\n```{{toctree}}\n:maxdepth: 1\n{':hidden:' if hidden else ''}\n\n{listed}\n```\n"
-
-
-def method_page(site: Path, name: str) -> str:
-    """What a method is, its settings, what was written about it by hand, its docstring."""
-    module, cls, what = METHODS[name]
-    method = getattr(importlib.import_module(module), cls)
-    rows = "".join(f"| `{f.name}` | `{f.default!r}` |\n" for f in dataclasses.fields(method))
-    settings = f"| setting | default |\n|---|---|\n{rows}\n{inspect.getdoc(method)}\n" if rows else "No settings.\n"
-    notes = site / "notes" / f"{name}.md"
-    by_hand = notes.read_text() if notes.exists() else ""
-    source = "\n".join(as_rst(inspect.getdoc(importlib.import_module(module)).splitlines()))
-    docstring = f"## In the words of its module\n\n`{module}`\n\n```{{eval-rst}}\n{source}\n```\n"
-    return f"# {name}\n\n{what[:1].upper()}{what[1:]}.\n\n{by_hand}\n## Settings\n\n{settings}\n{docstring}"
-
-
-def module_page(name: str, title: str) -> str:
-    """All public names of a module, from their docstrings."""
-    members = getattr(importlib.import_module(f"contactopt.{name}"), "__all__", None)
-    imported = "   :imported-members:\n" if members else ""
-    return f"# {title}\n\n```{{eval-rst}}\n.. automodule:: contactopt.{name}\n{imported}```\n"
-
-
-def reference_table() -> str:
-    """The names that `contactopt` exports, each with the first sentence about it."""
-    rows = []
-    for name in contactopt.__all__:
-        thing = getattr(contactopt, name)
-        home = name if inspect.ismodule(thing) else thing.__module__.split(".")[1]
-        first = inspect.getdoc(thing).split("\n\n")[0].replace("\n", " ").replace("|", "\\|")
-        rows.append(f"| [{name}](api/{home}.md) | {re.split(r'(?<=[.:]) ', first)[0]} |")
-    return "\n".join(["What `import contactopt` offers:\n", "| name | what it is |", "|---|---|", *rows, ""])
 
 
 def name_of(path: Path) -> str:
@@ -208,39 +127,3 @@ def opening(path: Path) -> str:
     picture = PICTURE.search(text)
     shown = f"{picture[0]}\n\n" if picture else ""
     return f"\n## {title.removeprefix('# ')}\n\n{first}\n\n{shown}[All of this report](reports/{name_of(path)}.md)\n"
-
-
-def as_rst(lines: list[str]) -> list[str]:
-    """Docstrings are plain text: aligned and indented lines become literal, the rest is kept from meaning anything.
-
-    Changes `lines` in place, as autodoc wants it, and returns it.
-    """
-    out: list[str] = []
-    kind = "prose"  # of the line before: prose, item (of a numbered list) or literal
-    for line in lines:
-        aligned = bool(line) and (line[0] == " " or re.search(r"\S {2,}\S", line) is not None)
-        if line.strip() and kind == "item" and line[0] == " ":
-            out[-1] += " " + _plain(line.strip())
-        elif aligned or (kind == "literal" and not line.strip()):
-            language = "pycon" if line.lstrip().startswith(">>>") else "text"
-            out += ["", f".. code-block:: {language}", ""] if kind != "literal" else []
-            out.append("    " + line if line.strip() else "")
-            kind = "literal"
-        else:
-            number = re.match(r"(\d+)\. ", line)
-            out += [""] if number or kind == "literal" else []
-            out.append(f"{number[1]}\\. {_plain(line[number.end() :])}" if number else _plain(line))
-            kind = "item" if number else "prose"
-    lines[:] = [*out, ""]
-    return lines
-
-
-def _plain(text: str) -> str:
-    """Prose without mark-up, but for `code`."""
-    parts = text.split("`")
-    if len(parts) % 2 == 0:  # a stray backtick: none is code
-        parts = [text.replace("`", "'")]
-    escaped = [
-        re.sub(r"([*|\\]|(?<=\w)_(?!\w))", r"\\\1", p) if i % 2 == 0 else f"``{p}``" for i, p in enumerate(parts)
-    ]
-    return "".join(escaped)

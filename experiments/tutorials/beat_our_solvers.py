@@ -1,9 +1,9 @@
 # %% [markdown]
 # # 7. Add your own solver and beat ours
 #
-# You have an idea for an algorithm. How good is it? This tutorial writes a method in 20 lines, puts it into a benchmark
-# beside ours without touching the package, and looks at the result without kindness. Twice: the first idea is slow; the
-# second is as fast as ours or faster, and wrong where it hurts.
+# You have an idea for an algorithm. How good is it? This tutorial writes a method in 20 lines and measures it in a
+# benchmark beside the methods of the package, which need not be changed for that. It does so twice. The first idea turns out
+# to be slow. The second is about as fast as the methods of the package, but on some problems its answers are wrong.
 #
 # Reading time: 10 minutes. You need the [letters](one_contact_node.py) and Newton's method.
 
@@ -25,14 +25,15 @@ folder = TemporaryDirectory()
 #
 # $$ u = Q r + V \lambda + q, \qquad V' r + s = 0, $$
 #
-# blocks of contacts normal first, $r$ the force on the upper body. It returns $r$, or $(r, \lambda)$. Settings are
-# arguments; `tol` and `time_limit` are passed if it asks for them. The benchmark believes nothing: each answer gets the
-# certificate.
+# with one block for each contact, normal component first; $r$ is the force on the upper body. The method returns $r$, or
+# $(r, \lambda)$. Its settings are arguments of the function. If it has the arguments `tol` and `time_limit`, it gets these
+# two as well. The benchmark does not rely on what the method claims: it computes the certificate of each answer.
 #
-# Methods run in processes of their own, which can be killed. So they live in a file. Here is the first.
+# Methods run in processes of their own, which can be ended when they take too long. Therefore they stand in a file of their
+# own. Here is the first one.
 #
-# **First idea: walk downhill.** The natural map $r \mapsto P_K(r - \rho (u + \mu |u_t| n))$ leaves solutions where they
-# are. Apply it again and again. `project_balanced` projects on the cones $K$ and keeps the balance of the plates.
+# **First idea: walk downhill.** The natural map $r \mapsto P_K(r - \rho (u + \mu |u_t| n))$ leaves a solution where it is. So
+# we apply this map again and again. `project_balanced` projects on the cones $K$ and keeps the balance of the plates.
 
 # %%
 FIRST = """
@@ -60,9 +61,9 @@ def walk_downhill(problem, tol, steps=2000):
 
 # %% [markdown]
 # **Second idea: guess and sort.** In 2D each contact is open ($r = 0$), sticks ($u = 0$) or slips ($u_n = 0$,
-# $r_t = \pm \mu r_n$). If we knew which, all would be linear equations. So guess that all stick; solve; sort the
-# contacts anew by $y = r - \rho u$; repeat until the sorting stays. That is a primal-dual active set method, and
-# Newton's method in disguise.
+# $r_t = \pm \mu r_n$). If we knew which of these each contact does, we would only have to solve linear equations. So we guess
+# that all contacts stick, solve, sort the contacts anew by $y = r - \rho u$, and repeat this until the sorting no longer
+# changes. This is a primal-dual active set method, and it can be understood as Newton's method.
 
 # %%
 SECOND = """
@@ -90,7 +91,7 @@ def guess_and_sort(problem, steps=40):
 """
 
 # %% [markdown]
-# Try it by hand before you measure it. A plug-in is plain Python.
+# A plug-in is plain Python, so we try it by hand before we measure it.
 
 # %%
 names = {}
@@ -105,9 +106,9 @@ assert np.allclose(r, solve(problem).reactions, atol=1e-6 * r.max())
 # %% [markdown]
 # ## The experiment
 #
-# One file says what is run. Lists are multiplied out. The first problems are elastic: the flat punch on three meshes.
-# The others are nasty: $Q$ has rank 10 for 12 contacts, so that forces are not unique. They come from a generator of
-# our own, registered in the same way.
+# One file says what is run. Every combination of the listed values is one run. The first problems are elastic: the flat
+# punch on three meshes. The others are harder: $Q$ has rank 10 only for 12 contacts, so the forces are not unique. They come
+# from a generator that we write and register in the same way.
 
 # %%
 PROBLEM = """
@@ -170,11 +171,11 @@ assert share.loc["punch-2d"].drop("walk_downhill").min() == 1.0  # all that coun
 assert best.loc["guess_and_sort"].sum() < best.loc["walk_downhill"].sum()
 
 # %% [markdown]
-# The walk downhill is orders of magnitude slower: it needs as many steps as the condition number of $Q$. Guessing and
-# sorting plays in our league, and on a quiet machine often wins: no safeguards, no history, no bookkeeping.
-# Congratulations?
+# The walk downhill is orders of magnitude slower, because the number of its steps is about the condition number of $Q$.
+# Guessing and sorting takes about as long as the methods of the package. On a quiet machine it is often faster, because it
+# has no safeguards and records nothing. Is it the better method, then?
 #
-# ## The nasty problems
+# ## The hard problems
 
 # %%
 loose = table[table["family"] == "loose"]
@@ -184,13 +185,14 @@ assert share.loc["loose", "auto"] > share.loc["loose", "guess_and_sort"]
 assert (loose["status"] == "false_claim").any()
 
 # %% [markdown]
-# Two columns deserve a look. `solved`: the certificate is below the tolerance. `false_claim`: the method came home with
-# an answer and called it one, but the laws do not hold. Our twenty lines end after 40 sortings that go round in a
-# circle, and return whatever they have. `auto` begins with the same idea, notices that it does not get anywhere, and
-# changes to methods that cope with a singular $Q$. That noticing is what its extra lines are for.
+# Two columns are important. In the column `solved` the certificate is below the tolerance. In the column `false_claim` the
+# method returned something as its answer, but this does not obey the laws. Our twenty lines stop after 40 sortings that go
+# round in a circle, and return the last iterate. `auto` begins with the same idea. It notices when it makes no progress,
+# and changes to methods that can deal with a singular $Q$.
 #
-# A fair picture needs both. A *performance profile* shows, for every method, the share of problems that it solves
-# within a factor of the best time. At the left, who is fastest; at the right, who gets there at all.
+# A fair picture shows both speed and success. A *performance profile* shows, for every method, the share of the problems that
+# it solves within a factor of the best time. Its left end shows which method is the fastest, and its right end shows which
+# methods solve the problems at all.
 
 # %%
 instance = ["problem", "repeat"]
@@ -209,8 +211,7 @@ assert (ratio["auto"] < np.inf).mean() > (ratio["guess_and_sort"] < np.inf).mean
 
 # %% [markdown]
 # `contactopt bench EXPERIMENT.toml` does the same from the command line, and `benchmark.figures` draws such pictures. A
-# method that deserves to stay moves into a file of its own: a frozen dataclass with `iterate`, one line in a table. See
-# *Contributing*.
+# method that is worth keeping becomes part of the package as one file and one line in a table; *Contributing* shows how.
 #
 # ## Exercises
 #
@@ -219,8 +220,8 @@ assert (ratio["auto"] < np.inf).mean() > (ratio["guess_and_sort"] < np.inf).mean
 #
 # <details><summary>Solution</summary>
 #
-# Python's `for ... else` runs the `else` if nothing broke the loop. The runs are then counted as `error`: not solved,
-# but not a lie either.
+# Python's `for ... else` runs the `else` if the loop was not left by `break`. Such runs are then counted as `error`. They
+# are still not solved, but the method no longer claims that they are.
 #
 # ```python
 # circle = "    else:\n        raise RuntimeError('no sorting stays')\n"
@@ -238,12 +239,12 @@ assert (ratio["auto"] < np.inf).mean() > (ratio["guess_and_sort"] < np.inf).mean
 #
 # </details>
 #
-# **2.** Rescue it: where the sorting fails, add a little compliance, $Q + \alpha I$, solve, and take its answer as the
-# centre of the next problem, $q - \alpha r$ (the proximal-point idea). Does it solve the nasty problems?
+# **2.** Mend it. Where the sorting fails, add a little compliance, $Q + \alpha I$, and solve; then take the answer as the
+# centre of the next problem, $q - \alpha r$. This is the proximal-point idea. Does it solve the hard problems?
 #
 # <details><summary>Solution</summary>
 #
-# Most of them: this is what the method `proximal` does with more care.
+# It solves more of them. The method `proximal` does the same with more care.
 #
 # ```python
 # from dataclasses import replace

@@ -1,9 +1,10 @@
 # %% [markdown]
 # # 4. Four roads to one answer
 #
-# Coulomb's problem is not the minimum of anything. So every method replaces it by something that can be solved, again
-# and again. Here four of them solve the same problem: alternating, Tresca, convex relaxation and Newton. Three arrive
-# at the same answer on different roads. One arrives at once, but somewhere else.
+# A solution of Coulomb's problem is not the minimum of an energy. So every method replaces this problem, again and again,
+# by another one that can be solved. In this tutorial four methods solve the same problem: the alternating iteration,
+# Tresca's iteration, Newton's method and the convex relaxation. The first three arrive at the same answer on different
+# roads. The fourth arrives in one step, but at another place.
 #
 # Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) has the programs for one node.
 
@@ -16,9 +17,10 @@ from contactopt import diagnose, natural_map_residual, reduce, scenes, solve
 # %% [markdown]
 # ## The problem
 #
-# A block, 40 mm x 40 mm, is pressed on a foundation of the same rubber with 100 N. We model half of it. The normal $n$
-# points up, out of the foundation; $r$ is the force on the block; the tangent points outwards. Under the load both
-# surfaces stretch, but not equally: friction has work to do. With $\mu = 0.2$ about half of the nodes slip.
+# A block, 40 mm wide and 40 mm high, is pressed on a foundation of the same rubber with 100 N. It is symmetric, so we
+# model its right half. The normal $n$ points up, out of the foundation. The tangent $t$ points to the right, which is
+# outwards. $r$ is the force on the block. Under the load both surfaces stretch, but not equally, and friction resists the
+# difference. With $\mu = 0.2$ about half of the nodes slip.
 
 # %%
 problem = reduce(scenes.flat_punch(2, mu=0.2, elements=32))
@@ -38,7 +40,7 @@ for method in ("alternating", "tresca"):
     assert np.allclose(answers[method].reactions, r, atol=1e-7 * r.max())
 
 # %% [markdown]
-# Three methods, one answer, to eight digits.
+# Three of the methods have found the same answer. Their forces differ by less than $10^{-7}$ of the largest one.
 #
 # ## The roads
 #
@@ -48,7 +50,7 @@ for method in ("alternating", "tresca"):
 # | Tresca | the friction bounds $g = \mu r_n$ | one QP in all forces |
 # | Newton | which nodes are open, stick or slip | one linear system |
 #
-# The certificate against the iteration shows two kinds of road.
+# We draw the certificate against the number of the iteration.
 
 # %%
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
@@ -61,12 +63,13 @@ ax.set(xlabel="iteration [-]", ylabel="certificate: natural-map residual [-]")
 ax.legend(frameon=False)
 
 # %% [markdown]
-# The fixed points go down a straight line: every iteration multiplies the error by the same number. Newton looks slow
-# at first: it is sorting the nodes. When the sorting is right, the equations are linear, and the next step is exact.
+# The two fixed-point iterations go down a straight line, because every iteration multiplies the error by the same number.
+# Newton's method looks slow at first, because it has to find out which nodes slip. As soon as it knows, the equations are
+# linear, and the next step is exact.
 #
-# Can we know the slope beforehand? Near the solution, a fixed point is a linear map: change the normal forces a little,
-# ask how the friction of the slipping nodes changes, ask how that changes the normal forces. The largest eigenvalue of
-# this *slip map* is the factor. `diagnose` computes it.
+# Can we know the slope of the straight lines beforehand? Near the solution the iteration is a linear map. Change the normal
+# forces a little; the friction forces of the slipping nodes change, and in turn the normal forces change. This map is
+# called the *slip map*, and its largest eigenvalue is the factor. `diagnose` computes it.
 
 # %%
 local = diagnose(problem, answers["newton"]).local
@@ -81,31 +84,34 @@ assert answers["newton"].history[-1]["residual"] < 1e-8 * answers["newton"].hist
 assert local.slip == slips.sum()
 
 # %% [markdown]
-# A factor of 0.06: friction couples only weakly to the normal forces here. The factor grows with $\mu$, and at one the
-# fixed points no longer converge. [Tutorial 5](no_one_or_three_solutions.py) goes there.
+# The factors are small, because friction couples only weakly to the normal forces here. The factor grows with $\mu$. If it
+# is one or more at a solution, the iteration does not converge to that solution.
+# [Tutorial 5](no_one_or_three_solutions.py) shows this case.
 #
-# Now watch one slipping node on its way. A method's state after $j$ iterations is what `solve` returns with
-# `max_iterations=j`.
+# Now we follow one slipping node on its way. `solve` with `max_iterations=j` returns the state of a method after $j$
+# iterations. As in tutorial 1, the friction force is drawn to the right and the normal force upwards.
 
 # %%
 node = np.flatnonzero(slips)[-8]
 fig, ax = plt.subplots(figsize=(6, 4.4), layout="constrained")
 for method, style in (("alternating", "o-"), ("tresca", "s-"), ("newton", "D-")):
     road = [solve(problem, method, tol=1e-13, max_iterations=j).reactions[node] for j in range(1, 8)]
-    ax.plot(*np.transpose(road), style, mfc="none", label=method)
+    normal, tangential = np.transpose(road)
+    ax.plot(tangential, normal, style, mfc="none", label=method)
 normal = np.array([0.97, 1.03]) * r[node, 0]
-ax.plot(normal, np.sign(r[node, 1]) * 0.2 * normal, "k--", lw=1, label=r"edge of the cone, $|r_t| = \mu\, r_n$")
-ax.plot(*r[node], "k*", ms=12, label="solution")
-ax.set(xlabel="normal force $r_n$ [N]", ylabel="friction force $r_t$ [N]")
+ax.plot(np.sign(r[node, 1]) * 0.2 * normal, normal, "k--", lw=1, label=r"edge of the cone, $|r_t| = \mu\, r_n$")
+ax.plot(r[node, 1], r[node, 0], "k*", ms=12, label="solution")
+ax.set(xlabel="friction force $r_t$ [N]", ylabel="normal force $r_n$ [N]")
 ax.legend(frameon=False)
 
 # %% [markdown]
 # ## The fourth road
 #
 # The *convex relaxation* minimises the energy over all cones at once, $\min \tfrac12 r'Qr + q'r$ with
-# $|r_t| \le \mu r_n$: one program, no iteration, a minimum that always exists. Its certificate of $10^{-3}$ is no
-# accident and no rounding error. It solved its own problem exactly, which is another one: *associated friction*. In
-# that law a contact that slips also opens, by $u_n = \mu |u_t|$.
+# $|r_t| \le \mu r_n$. It is one convex program without any iteration around it. Its certificate, printed above, is about
+# $6 \cdot 10^{-3}$, while those of the other methods are below $10^{-10}$. This is not a rounding error. The relaxation has
+# solved its own problem exactly, but that problem is another one: *associated friction*. In this law a contact that slips
+# also opens, by $u_n = \mu |u_t|$.
 
 # %%
 relaxed = answers["relaxation"]
@@ -124,15 +130,15 @@ right.plot(x, 0.2 * np.abs(u_relaxed[:, 1]), "k:", label=r"associated: $\mu\, |u
 right.set(xlabel="x [mm]", ylabel="displacement [mm]")
 right.legend(frameon=False)
 
-assert relaxed.residual > 1e-3  # not Coulomb's problem
+assert 5.5e-3 < relaxed.residual < 6.5e-3  # not Coulomb's problem
 assert np.allclose(u[:, 0], 0.0, atol=1e-9)  # everything touches
 assert np.allclose(u_relaxed[:, 0], 0.2 * np.abs(u_relaxed[:, 1]), atol=1e-6)  # slips, so it floats
 assert np.isclose(relaxed.reactions[:, 0].sum(), 100.0)
 
 # %% [markdown]
-# The edge of the block floats on nothing but a wrong law. For rock or sand, which dilate when they slide, that may be
-# right. For metals and rubber it is not. The relaxation is exact only where no loaded contact slips; `diagnose` tells
-# whether it is, and calls it *tight*.
+# In this law the slipping edge of the block floats above the foundation and is pressed on it at the same time. For rock or
+# sand, which dilate when they slide, that may be right. For metals and rubber it is not. The relaxation has Coulomb's
+# answer only where no loaded contact slips. `diagnose` tells whether this is so, and calls the relaxation *tight* then.
 
 # %%
 print(diagnose(problem))
@@ -141,9 +147,9 @@ assert diagnose(problem).relaxation == "not tight"
 assert natural_map_residual(problem, r, answers["newton"].multipliers) < 1e-12
 
 # %% [markdown]
-# Which road for whom? Newton needs the fewest steps and one dense factorisation in each; it may cycle if $Q$ is
-# singular. The fixed points reuse a good QP solver as it stands. The default, `solve(problem)`, begins with Newton and
-# falls back on the cones and a proximal loop.
+# Which road should you take? Newton's method needs few steps, with one dense factorisation in each, and it may run in a
+# circle if $Q$ is singular. The fixed-point iterations use a good QP solver as it stands. The default, `solve(problem)`,
+# begins with Newton's method. Where that fails, it solves cone programs, and then runs a proximal loop.
 #
 # ## Exercises
 #
@@ -151,8 +157,8 @@ assert natural_map_residual(problem, r, answers["newton"].multipliers) < 1e-12
 #
 # <details><summary>Solution</summary>
 #
-# Without friction the bounds are known and zero: the first QP is the answer. With much friction everything sticks. Then
-# the bounds do not matter, and Tresca needs no second look.
+# Without friction the bounds are known to be zero, so the first QP gives the answer. With much friction every node
+# sticks. Then the bounds do not matter, and Tresca's iteration confirms its first answer by its second.
 #
 # ```python
 # smooth = reduce(scenes.flat_punch(2, mu=0.0, elements=16))
@@ -181,8 +187,8 @@ assert natural_map_residual(problem, r, answers["newton"].multipliers) < 1e-12
 #
 # <details><summary>Solution</summary>
 #
-# Tresca's do not: its factor is a property of the bodies, not of the mesh. Newton's grow a little, since there are more
-# nodes to sort.
+# The count of Tresca's iteration does not grow, because its factor is a property of the bodies and not of the mesh. That of
+# Newton's method grows a little, because there are more nodes to sort.
 #
 # ```python
 # counts = {}

@@ -1,9 +1,10 @@
 # %% [markdown]
 # # 2. From two bodies to Q
 #
-# [Tutorial 1](one_contact_node.py) took the compliance $Q$ for granted. Here we build it from two elastic bodies, by
-# hand. The tool is the *Schur complement*: eliminate everything that is not on the interface. Then we look at the
-# spectrum of $Q$. It explains why iterative methods find contact problems hard, and what a preconditioner must do.
+# [Tutorial 1](one_contact_node.py) took the compliance $Q$ for granted. In this tutorial we build it by hand from two
+# elastic bodies. The tool is the *Schur complement*, which eliminates everything that is not on the interface. Then we look
+# at the spectrum of $Q$. It explains why contact problems are hard for iterative methods, and what a preconditioner has to
+# do.
 #
 # Reading time: 10 minutes. You need to have seen a finite element stiffness matrix.
 
@@ -18,18 +19,19 @@ from contactopt.scenes.meshes import graded, rename, tensor_mesh
 # ## Two springs
 #
 # Two springs in series press on each other. Their stiffnesses are $s_1$ and $s_2$. Under a common force $r$ the first
-# gives way by $r / s_1$, the second by $r / s_2$. Displacements add, so compliances add:
+# spring gives way by $r / s_1$ and the second by $r / s_2$. The displacements add up, and therefore the compliances do:
 #
 # $$ Q = s_1^{-1} + s_2^{-1} . $$
 #
-# Nothing else happens with two bodies. Only the springs become matrices, $Q = S_1^{-1} + S_2^{-1}$, and $r$ and $-r$
-# are the forces on the two sides of the interface. (This is the operator of the paper's equation 14.)
+# The same happens with two elastic bodies, where matrices take the place of the springs: $Q = S_1^{-1} + S_2^{-1}$. The
+# forces on the two sides of the interface are $r$ and $-r$. (This is the operator of the paper's equation 14.)
 #
 # ## Two blocks
 #
-# A punch, 4 wide and 4 high, stands on a foundation, 16 wide and 8 deep. Both are made of the same rubber. The punch is
-# held on top, the foundation is clamped below. The meshes are fine at the interface and coarse away from it: stresses
-# that vary fast along the surface do not reach deep. Both are 1 mm thick.
+# A punch, 4 mm wide and 4 mm high, stands on a foundation, 16 mm wide and 8 mm high. Both are 1 mm thick, measured
+# perpendicular to the plane, and both are made of the same rubber. The punch is held at its top, and the foundation is
+# clamped at its bottom. The meshes are fine at the interface and coarse away from it, because stresses that vary fast along
+# the surface fade quickly below it.
 
 
 # %%
@@ -70,12 +72,12 @@ assert all(len(body.nodes) == 33 for body in bodies)
 # $$ \begin{bmatrix} A_{ii} & A_{ic} \\ A_{ci} & A_{cc} \end{bmatrix}
 #    \begin{bmatrix} U_i \\ U_c \end{bmatrix} = \begin{bmatrix} 0 \\ r \end{bmatrix} . $$
 #
-# The first row gives $U_i = -A_{ii}^{-1} A_{ic} U_c$. Put into the second row:
+# The first row gives $U_i = -A_{ii}^{-1} A_{ic} U_c$. We put this into the second row and get
 #
 # $$ S\, U_c = r, \qquad S = A_{cc} - A_{ci} A_{ii}^{-1} A_{ic} . $$
 #
-# $S$ is the Schur complement. It is the stiffness that you feel when you hold the body by its contact nodes: few
-# unknowns, but every one coupled to every other.
+# $S$ is the Schur complement. It is the stiffness that you feel when you move the body by its contact nodes. It has few
+# unknowns, but each of them is coupled to all others.
 
 
 # %%
@@ -105,8 +107,8 @@ for S in (S1, S2):
 # The project counts one block per contact, *normal first*. The normal $n$ points out of the lower body: here upwards,
 # $n = (0, 1)$. The tangent is $t = (1, 0)$. So each block $(x, y)$ is read backwards: $(y, x)$.
 #
-# The force on the upper body is $+r$ and on the lower $-r$; the relative displacement is upper minus lower. Two minus
-# signs cancel, and the compliances add, as for the springs.
+# The force on the upper body is $+r$, and that on the lower body is $-r$. The relative displacement is that of the upper body
+# minus that of the lower one. The two minus signs cancel, and the compliances add up, as those of the springs did.
 
 # %%
 nodes = len(S1) // 2
@@ -118,14 +120,14 @@ assert np.allclose(Q, problem.Q, rtol=1e-8, atol=1e-12)
 assert np.all(np.diff(problem.coordinates[0]) > 0)
 
 # %% [markdown]
-# The same to eight digits as `contactopt.reduce`, which factorises each sparse matrix once, with the contact unknowns
-# last, and reads $S$ off the end of the factors. Nothing below this line knows that finite elements exist: all a solver
-# sees is $u = Q r + q$.
+# This is, to eight digits, the $Q$ of `contactopt.reduce`, which does the same with sparse factors. From here on nobody needs
+# to know that there are finite elements: all that a solver sees is $u = Q r + q$.
 #
 # ## What Q looks like
 #
-# Take the normal block $Q_{nn}$. Each column is the dent that a unit force at one node makes. It is deepest where the
-# force is, twice as deep at an edge, and falls off slowly: every node feels every other.
+# Take the normal block $Q_{nn}$. Each of its columns is the dent that a unit force at one node makes. The dent is deepest
+# where the force acts, and twice as deep if the force acts at an edge. It falls off slowly, so every node feels all
+# others.
 
 # %%
 Q_nn = Q[::2, ::2]
@@ -147,8 +149,8 @@ assert np.array_equal(np.argmax(Q_nn, axis=0), np.arange(nodes))
 assert Q_nn[0, 0] > 1.8 * Q_nn[16, 16]
 
 # %% [markdown]
-# The eigenvectors are waves. Number $j$ changes its sign exactly $j$ times, like $\cos(j \pi x / L)$. The longest wave
-# is the softest.
+# The eigenvectors are waves. Eigenvector number $j$ changes its sign exactly $j$ times, like $\cos(j \pi x / L)$ on a line of
+# length $L$. The longest wave belongs to the largest eigenvalue: it is the softest.
 
 # %%
 changes = [np.sum(np.diff(np.sign(v)) != 0) for v in vectors.T]
@@ -157,17 +159,18 @@ assert changes == list(range(nodes))
 # %% [markdown]
 # ## The law behind it
 #
-# Press a wave $p \cos(\xi x)$ on an elastic half-plane. The surface sinks by the same wave, times
-# $2 (1-\nu^2) / (E\,|\xi|)$: short waves are stiff, because they only strain a thin layer. Two bodies add up to
+# Press on an elastic half-plane with a pressure that is a wave, $\cos(\xi x)$. The surface sinks by the same wave, multiplied
+# by $2 (1-\nu^2) / (E\,|\xi|)$. Short waves are stiff, because they strain only a thin layer. The factors of two bodies add up
+# to
 #
 # $$ \frac{2}{E^*} \frac{1}{|\xi|}, \qquad \frac1{E^*} = \frac{1-\nu_1^2}{E_1} + \frac{1-\nu_2^2}{E_2} . $$
 #
-# So $Q$ smooths, about as much as one integration does: it divides the wave with wave number $\xi$ by $|\xi|$.
-# Displacements have one derivative more than forces; in the language of Sobolev spaces, $Q$ maps $H^{-1/2}$ to
+# So $Q$ divides the wave with wave number $\xi$ by $|\xi|$. It makes functions smoother, about as much as one integration
+# does. Displacements have one derivative more than tractions; in the language of Sobolev spaces, $Q$ maps $H^{-1/2}$ to
 # $H^{1/2}$.
 #
-# Our bodies are finite, and yet: wave number $j$ has $\xi_j = j \pi / L$, and nodal forces are pressure times the
-# spacing $h$. Prediction: the eigenvalues are $2 / (E^* h\, \xi_j)$.
+# Our bodies are finite. Still, wave number $j$ has about $\xi_j = j \pi / L$, and a nodal force is the pressure times the
+# spacing $h$ of the nodes. So we predict the eigenvalues $2 / (E^* h\, \xi_j)$.
 
 # %%
 modulus = 1 / (2 * (1 - 0.3**2) / 5.0)  # E*, MPa
@@ -187,9 +190,9 @@ ax.set(xlabel="number j of the wave [-]", ylabel=r"eigenvalue of $Q_{nn}$ times 
 ax.legend(frameon=False)
 
 # %% [markdown]
-# A straight line of slope $-1$, on every mesh; it bends only where the waves get too short for the mesh. Each
-# refinement adds shorter waves at the stiff end and changes nothing at the soft end. So the condition number (largest
-# over smallest eigenvalue) is proportional to the number of nodes:
+# On every mesh we see a straight line of slope $-1$. It bends only where the waves are too short for the mesh. Each
+# refinement adds shorter waves at the stiff end and changes nothing at the soft end. So the condition number, which is the
+# largest eigenvalue over the smallest, is proportional to the number of nodes:
 
 # %%
 conditions = []
@@ -202,8 +205,8 @@ growth = np.array(conditions)[1:] / np.array(conditions)[:-1]
 assert np.all((growth > 1.9) & (growth < 2.1))
 
 # %% [markdown]
-# All of $Q$ is ten times worse than its normal block, but grows at the same rate. The reason is one more soft motion:
-# the punch can sway sideways. It is a beam, 4 high and 4 wide, held on top.
+# The condition number of the whole $Q$ is about ten times that of its normal block, but it grows at the same rate. The
+# reason is one more soft motion: the punch, which is held at its top, can sway sideways.
 #
 # [Tutorial 3](why_the_preconditioner_works.py) undoes the division by $|\xi|$.
 #
@@ -213,7 +216,7 @@ assert np.all((growth > 1.9) & (growth < 2.1))
 #
 # <details><summary>Solution</summary>
 #
-# The second spring no longer gives way: what remains is the compliance of the punch alone.
+# The second spring no longer gives way, so only the compliance of the punch remains.
 #
 # ```python
 # stiff = reduce(two_blocks(33, lower=5e6)).Q
@@ -229,8 +232,9 @@ assert np.all((growth > 1.9) & (growth < 2.1))
 #
 # <details><summary>Solution</summary>
 #
-# Into $u = Q r + V \lambda + q$ with the balance $V' r + s = 0$. One column of $V$ moves all nodes up by one; $\lambda$
-# is the unknown displacement of the plate; $s$ is the load. The plate is glued, so it holds the punch sideways.
+# It puts this motion into $u = Q r + V \lambda + q$ with the balance $V' r + s = 0$. The only column of $V$ moves all nodes up
+# by one, $\lambda$ is the unknown displacement of the plate, and $s$ is the load. The plate is glued to the punch, so it
+# holds the punch sideways.
 #
 # ```python
 # from dataclasses import replace
@@ -253,8 +257,8 @@ assert np.all((growth > 1.9) & (growth < 2.1))
 #
 # <details><summary>Solution</summary>
 #
-# $(3 \cdot 10^4)^2 = 9 \cdot 10^8$ numbers, 7 GB. Products $Q r$ need no $Q$: one forward and one backward substitution
-# per body, which is what `reduction.operator` does.
+# It holds $(3 \cdot 10^4)^2 = 9 \cdot 10^8$ numbers, which take 7 GB. A product $Q r$ does not need $Q$ itself: one forward and
+# one backward substitution with the factors of each body are enough, and `reduction.operator` does that.
 #
 # ```python
 # assert (3 * 100 * 100) ** 2 * 8 / 1e9 > 7

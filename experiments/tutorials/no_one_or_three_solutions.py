@@ -1,9 +1,9 @@
 # %% [markdown]
 # # 5. When friction has no solution, two or three
 #
-# Elasticity has one solution. Contact without friction has one solution. Friction need not. This tutorial shows
-# problems of a single contact that have three solutions, exactly two, and none at all; a method that runs in circles
-# although there is exactly one; and the tools that tell beforehand.
+# A problem of elasticity has one solution, and so has contact without friction. With friction this need not be so. This
+# tutorial shows problems of a single contact that have three solutions, exactly two, and none at all. It shows a method
+# that runs in circles although there is exactly one solution, and the tools that tell all this beforehand.
 #
 # Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) explains the letters.
 
@@ -17,33 +17,52 @@ from contactopt import InterfaceProblem, Status, all_solutions, diagnose, models
 # %% [markdown]
 # ## One node, two springs
 #
-# The elastic node has the stiffness $K$. In $K$ the order of the components is (tangential, normal), as one would write
-# a finite element matrix. A load $f$ presses the node *down* on a floor by $f_n$ and pushes it *to the right* by $f_t$.
-#
-# The project's convention is normal first, $n$ up, $r$ the force on the upper body. We choose $t$ to the left. So we
-# swap the components, and both displacements change sign. The compliance is $Q = K^{-1}$, and without contact the node
-# goes to $q$.
+# An elastic node stands on a floor. As in [tutorial 1](one_contact_node.py), $n$ points up, $t$ points to the right, and
+# the normal component comes first. The node hangs on springs with the stiffness matrix $K$. A load *pushes* it to the right
+# and *presses* it down on the floor. The compliance is $Q = K^{-1}$, and without the floor the node would go to
+# $q = Q\,(-\text{press},\ \text{push})$.
 
 # %%
-K = np.array([[1.0, 1.5], [1.5, 4.0]])  # N / mm
+fig, ax = plt.subplots(figsize=(5, 3), layout="constrained")
+ax.axhspan(-0.5, 0, color="0.8", lw=0)
+ax.plot([-2.2, 2.4], [0, 0], "k", lw=1)
+steps, side = np.linspace(0, 1, 15), 0.1 * np.array([0, 0, *[1, -1] * 5, 0, 0, 0])
+for start, end in (((-1.9, 1.2), (-0.1, 0.15)), ((-0.6, 2.0), (-0.05, 0.2))):  # springs: one of them is oblique
+    along = np.subtract(end, start)
+    across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+    ax.plot(*(np.outer(steps, along) + start + np.outer(side, across)).T, "C0", lw=1.5)
+    ax.plot(*start, "s", color="0.3")
+ax.plot(0, 0.1, "o", ms=10, color="C0")
+for tail, head, name, color, at in (
+    ((0, 1.0), (0, 0.25), "press", "C1", (0.07, 0.75)),
+    ((0.15, 0.1), (0.95, 0.1), "push", "C1", (0.6, 0.2)),
+    ((1.5, 0), (1.5, 0.8), "$n$", "k", (1.58, 0.7)),
+    ((1.5, 0), (2.3, 0), "$t$", "k", (2.2, 0.1)),
+):
+    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
+    ax.text(*at, name, color=color, fontsize=12)
+ax.set(xlim=(-2.2, 2.4), ylim=(-0.5, 2.2), aspect="equal")
+ax.axis("off")
+
+# %%
+K = np.array([[4.0, -1.5], [-1.5, 1.0]])  # N / mm; normal component first
 
 
-def node(f_t, f_n, mu):
-    right, down = np.linalg.solve(K, [f_t, f_n])
-    Q = np.linalg.inv(K)[::-1, ::-1]
-    return InterfaceProblem(Q, [[-down, -right]], mu)
+def node(push, press, mu):
+    Q = np.linalg.inv(K)
+    return InterfaceProblem(Q, [Q @ [-press, push]], mu)
 
 
 problem = node(0.8, 1.0, mu=1.0)
 print(problem.Q, problem.q)
 
-assert problem.Q[0, 1] < 0  # what lifts the node also moves it to the right: that is where the trouble comes from
+assert problem.Q[0, 1] > 0  # a push to the right also lifts the node: that is where the trouble comes from
 
 # %% [markdown]
 # ## Three answers
 #
 # `all_solutions` sorts every contact into open, stick, slip to the left or to the right, by a mixed-integer program,
-# until no combination is left. For the load $f = (0.8, 1)$ and $\mu = 1$:
+# until no combination is left. We push with 0.8 N, press with 1 N, and take $\mu = 1$:
 
 # %%
 solutions = sorted(all_solutions(problem), key=lambda s: s.reactions[0, 0])
@@ -51,15 +70,16 @@ for s in solutions:
     (u_n, u_t), (r_n, r_t) = problem.displacements(s.reactions, s.multipliers)[0] + 0.0, s.reactions[0]
     print(f"gap {u_n:.3f}, slip {u_t:.3f}, normal force {r_n:.3f}, friction {r_t:.3f}, certificate {s.residual:.0e}")
 
-assert np.allclose([s.reactions[0] for s in solutions], [[0.0, 0.0], [0.4, 0.4], [1.0, 0.8]])
+assert np.allclose([s.reactions[0] for s in solutions], [[0.0, 0.0], [0.4, -0.4], [1.0, -0.8]])
 assert all(s.residual < 1e-12 for s in solutions)
 
 # %% [markdown]
-# *Open:* the node moves to the right, and because of the coupling it lifts off. *Stick:* friction holds it back, so it
-# does not lift off, so it is pressed down, so there is friction. *Slip:* something in between. All three obey every law
-# exactly. Which one happens depends on the history, and that is not in the data.
+# In the first solution the node is *open*: it moves to the right, and because of the coupling it lifts off. In the third
+# it *sticks*: friction holds it back, therefore it does not lift off, therefore it is pressed on the floor, and therefore
+# there is friction. The second solution, *slip*, lies in between. All three obey every law exactly. Which one happens in
+# reality depends on the history, and the data say nothing about that.
 #
-# Which one does a method find? The one it starts near:
+# A method finds the solution that it starts near:
 
 # %%
 for s in solutions:
@@ -77,8 +97,8 @@ fig, ax = plt.subplots(figsize=(6.4, 4), layout="constrained")
 points = [(mu, s.reactions[0]) for mu in np.linspace(0.4, 1.6, 49) for s in all_solutions(node(0.8, 1.0, mu))]
 for label, color, chosen in (
     ("open", "C0", [(mu, r[0]) for mu, r in points if r[0] < 1e-6]),
-    ("slip", "C1", [(mu, r[0]) for mu, r in points if r[0] > 1e-6 and np.isclose(r[1], mu * r[0], rtol=1e-6)]),
-    ("stick", "C2", [(mu, r[0]) for mu, r in points if r[0] > 1e-6 and r[1] < mu * r[0] * (1 - 1e-6)]),
+    ("slip", "C1", [(mu, r[0]) for mu, r in points if r[0] > 1e-6 and np.isclose(-r[1], mu * r[0], rtol=1e-6)]),
+    ("stick", "C2", [(mu, r[0]) for mu, r in points if r[0] > 1e-6 and -r[1] < mu * r[0] * (1 - 1e-6)]),
 ):
     ax.plot(*np.transpose(chosen), "o", ms=3, color=color, label=label)
 ax.axvline(2 / 3, color="grey", lw=1, ls="--")
@@ -91,38 +111,49 @@ print(count)
 assert count == {0.6: 1, 0.7: 1, 0.8: 2, 0.9: 3}
 
 # %% [markdown]
-# At $\mu = 0.8$ there are *exactly two*: sticking with all the friction there is, and open. That is the birth of the
-# pair stick and slip. Two solutions are always such a border case; one, three, five are the rule.
-#
-# For other loads the pair is born elsewhere. Below which $\mu$ is there one solution *whatever the load*? For one
-# contact the answer is exact, $\mu^* = K_{tt} / |K_{tn}| = 2/3$, and `diagnose` knows it without looking at the load.
+# At $\mu = 0.8$ there are *exactly two* solutions: in one of them the node is open, and in the other it sticks with all the
+# friction that there is. Here the pair of stick and slip is born. Such a border case is an exception. Generically, that is
+# for all data but exceptional ones, the number of solutions is *odd* as long as $Q$ is positive definite: solutions appear
+# and disappear in pairs. Loads drawn at random show it.
+
+# %%
+random = np.random.default_rng(0)
+numbers = [len(all_solutions(node(*random.normal(size=2), mu=1.0))) for _ in range(200)]
+print("solutions for 200 random loads:", {n: numbers.count(n) for n in sorted(set(numbers))})
+
+assert set(numbers) == {1, 3}
+
+# %% [markdown]
+# For other loads the pair is born at another $\mu$. Below which $\mu$ is there one solution *whatever the load*? For one
+# contact the answer is known exactly, $\mu^* = K_{tt} / |K_{tn}| = 2/3$, and `diagnose` finds it without the load.
 
 # %%
 print(diagnose(problem))
 
 assert diagnose(problem).exact
-assert np.isclose(diagnose(problem).guaranteed.unique, K[0, 0] / abs(K[0, 1]))
+assert np.isclose(diagnose(problem).guaranteed.unique, K[1, 1] / abs(K[0, 1]))
 
 angles = np.linspace(40, 70, 61)
 loads = np.column_stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))])
 fig, ax = plt.subplots(figsize=(6.4, 3), layout="constrained")
 for mu in (0.6, 0.7, 1.0):
-    number = [len(all_solutions(node(*f, mu))) for f in loads]
+    number = [len(all_solutions(node(*load, mu))) for load in loads]
     ax.step(angles, number, where="mid", label=rf"$\mu$ = {mu}")
     assert max(number) == (1 if mu < 2 / 3 else 3)
 ax.set(xlabel="direction of the load [degrees from horizontal]", ylabel="number of solutions [-]", yticks=[1, 2, 3])
 ax.legend(frameon=False)
 
 # %% [markdown]
-# Just above the threshold the trouble sits in a narrow sector of loads; with more friction it opens up.
+# Just above the threshold only loads in a narrow sector have three solutions. With more friction the sector becomes wider.
 #
-# For many contacts no such formula is known. `diagnose` then gives two bounds: a coefficient below which
-# uniqueness is *guaranteed* for every load, and one at which some load *spoils* it. Between them nobody knows.
+# For many contacts no such formula is known. `diagnose` then gives two bounds: a coefficient below which the solution is
+# *guaranteed* to be unique for every load, and a coefficient at which some load has several. Between the two bounds
+# `diagnose` makes no statement.
 #
 # ## One solution, and a method that runs in circles
 #
-# Now pull the node hard the other way, $f = (-10, 1)$. There is one solution for $\mu = 1$, but the Tresca iteration
-# never finds it.
+# Now pull the node to the left with 10 N and press it down with 1 N. There is one solution for $\mu = 1$, but the Tresca
+# iteration does not find it.
 
 # %%
 pulled = node(-10.0, 1.0, mu=1.0)
@@ -130,13 +161,13 @@ pulled = node(-10.0, 1.0, mu=1.0)
 stuck_in_a_loop = solve(pulled, "tresca")
 print(f"{stuck_in_a_loop.status}: {stuck_in_a_loop.status.sentence}")
 
-assert np.allclose(only.reactions, [[6.4, -6.4]])
+assert np.allclose(only.reactions, [[6.4, 6.4]])
 assert stuck_in_a_loop.status is Status.CYCLING
 
 # %% [markdown]
-# Draw it. With the friction bound $g$ given, one QP yields the normal force $r_n(g)$, and the next bound is
-# $\mu\, r_n(g)$. A solution is where this curve meets the diagonal. The iteration goes up to the curve, across to the
-# diagonal, up to the curve. If the curve is steeper than one, it spirals outwards.
+# A drawing shows why. For a given friction bound $g$ one QP yields the normal force $r_n(g)$, and the next bound is
+# $\mu\, r_n(g)$. A solution is a point where this curve meets the diagonal. The iteration goes vertically to the curve, then
+# horizontally to the diagonal, and so on. If the curve falls by more than one per unit, the path spirals outwards.
 
 # %%
 fig, axes = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained", sharey=True)
@@ -166,9 +197,11 @@ assert solve(node(-10.0, 1.0, 0.6), "tresca").solved
 assert np.isclose(max(y for _, y in path), 14.5, atol=0.1)  # the cycle runs between 1 and 14.5
 
 # %% [markdown]
-# The curve's slope at the solution is $-\mu / \mu^*$, so the same number $2/3$ decides: contraction below, circles
-# above. But mind the sign. A slope of $-1$ ruins the *iteration*; a slope of $+1$ ruins *uniqueness*. Here the slope is
-# negative: the answer is unique and only the method is to blame. Two remedies: take half steps, or take another method.
+# At this solution the node slips to the left, and the slope of the curve is $-\mu / \mu^*$. So the same number 2/3 decides:
+# below it the iteration contracts, and above it the iteration runs in circles. But mind the sign. A slope of $-1$ is the end
+# of the *iteration*. A slope of $+1$ is the end of *uniqueness*, and needs a node that slips to the right. Here the slope is
+# negative, so the solution is unique, and the fault is the method's. There are two remedies: to take half steps, or to take
+# another method.
 
 # %%
 half_steps = solve(pulled, "tresca", relaxation=0.5)
@@ -181,15 +214,16 @@ for remedy in (half_steps, newton):
 # %% [markdown]
 # ## No solution
 #
-# If $Q$ is positive definite there is always a solution. So let it be singular: a piston in a rigid guide at 45
-# degrees. It can move up and right, or down and left, and nowhere else: $Q = m m'$ with $m = (1, 1)$. The floor below
-# rises by 1 mm, $q = (-1, 0)$. The piston must give way, up the guide. So it slips over the floor to the right, and
-# friction pulls it to the left, back down: $r_t = -\mu r_n$. What pushes it up the guide is
+# If $Q$ is positive definite there is always a solution. So let $Q$ be singular, and consider a piston in a rigid guide at
+# 45 degrees. It can move up and to the right at the same time, or down and to the left, and in no other way:
+# $Q = m m'$ with $m = (1, 1)$. The floor below it rises by 1 mm, so that $q = (-1, 0)$. The piston has to give way and moves
+# up in its guide. So it slips over the floor to the right, and friction pulls it to the left, back down:
+# $r_t = -\mu r_n$. The force that moves it up the guide is
 #
 # $$ m \cdot r = r_n + r_t = (1 - \mu)\, r_n . $$
 #
-# It must be 1 N. So $r_n = 1 / (1 - \mu)$. At $\mu = 1$ the force is infinite. Beyond, there is no force at all: the
-# piston *jams*.
+# This force has to be 1 N, so $r_n = 1 / (1 - \mu)$. As $\mu$ approaches one, the normal force grows without bound. For
+# $\mu \ge 1$ no force moves the piston: it *jams*.
 
 # %%
 m = np.array([1.0, 1.0])
@@ -206,9 +240,9 @@ print(f"mu = 2: {jammed.status}, certificate {jammed.residual:.2f}")
 assert not jammed.solved and jammed.residual > 0.1
 
 # %% [markdown]
-# No method finds what does not exist, and the certificate says so. The model is at fault: nothing is rigid. Let the
-# guide give a little, by $\varepsilon$. Now $Q$ is positive definite, a solution exists, and the piston sticks, wedged
-# in with a force of about $1 / (2 \varepsilon)$.
+# No method finds a solution that does not exist, and the certificate shows it. The model is at fault, because nothing is
+# perfectly rigid. Let the guide give way a little, by $\varepsilon$. Now $Q$ is positive definite, and a solution exists. For
+# $\mu = 2$ the piston sticks in it, wedged in with a force of about $1 / (2 \varepsilon)$.
 
 # %%
 gives = np.logspace(-4, 0, 17)
@@ -225,11 +259,13 @@ assert len(all_solutions(piston(2.0, give=1e-2))) == 1
 # %% [markdown]
 # ## Exercises
 #
-# **1.** Put two copies of the first node side by side, without coupling. How many solutions? And three copies?
+# **1.** Put two copies of the first node side by side, without coupling. How many solutions are there? And with three
+# copies?
 #
 # <details><summary>Solution</summary>
 #
-# Every copy chooses for itself: $3^2 = 9$, $3^3 = 27$. The number of solutions can grow exponentially.
+# Every copy has its own three solutions, so there are $3^2 = 9$ and $3^3 = 27$. The number of solutions can grow
+# exponentially with the number of contacts.
 #
 # ```python
 # for copies in (2, 3):
@@ -240,11 +276,12 @@ assert len(all_solutions(piston(2.0, give=1e-2))) == 1
 #
 # </details>
 #
-# **2.** Does the alternating iteration fail at the same coefficient? Where does it cycle for $f = (-10, 1)$, $\mu = 1$?
+# **2.** Pull with 10 N and press with 1 N. Does the alternating iteration fail at the same coefficient as Tresca's? Between
+# which points does it cycle for $\mu = 1$?
 #
 # <details><summary>Solution</summary>
 #
-# For one contact, yes. It cycles between two other points.
+# For one contact it does. It cycles between two points that differ from those of Tresca's iteration.
 #
 # ```python
 # assert solve(node(-10.0, 1.0, 0.66), "alternating", max_iterations=5000).solved
@@ -260,7 +297,8 @@ assert len(all_solutions(piston(2.0, give=1e-2))) == 1
 #
 # <details><summary>Solution</summary>
 #
-# One, for every $\mu$: without coupling friction does not change the normal force. The threshold is infinite.
+# There is one solution for every $\mu$, because without coupling friction does not change the normal force. The threshold
+# is infinite.
 #
 # ```python
 # uncoupled = InterfaceProblem(np.diag([0.25, 1.0]), [[-1.0, 5.0]], 100.0)

@@ -1,10 +1,10 @@
 # %% [markdown]
 # # 1. One contact node by hand
 #
-# One node of an elastic body comes down on a floor. Will it touch? Will it slide? How large are the forces? This
-# tutorial answers three times, each time with another kind of mathematical program: a quadratic program (QP), a
-# second-order cone program (SOCP) and a complementarity problem. The programs are written in `cvxpy`, in five lines
-# each.
+# One node of an elastic body comes down on a floor. Will it touch the floor? Will it slide? How large are the forces?
+# This tutorial answers these questions three times, each time with another kind of mathematical program: a quadratic
+# program (QP), a second-order cone program (SOCP), and a complementarity problem. Each program is written in `cvxpy`,
+# in about five lines.
 #
 # Reading time: 10 minutes. You need linear algebra, and you should have seen a Lagrange multiplier before.
 
@@ -20,39 +20,67 @@ from contactopt import InterfaceProblem, all_solutions, natural_map_residual, so
 # %% [markdown]
 # ## The problem
 #
-# Two bodies meet: the lower one is the floor, the upper one is elastic. The unit vector $n$ points out of the *lower*
-# body, so it points up. The unit vector $t$ points along the floor.
+# Two bodies meet. The lower one is the floor, and the upper one is elastic. The unit vector $n$ points out of the
+# *lower* body, so it points up. The unit vector $t$ points along the floor, to the right. Every vector is written with
+# its normal component first.
 #
-# - $r = (r_n, r_t)$ is the force on the *upper* body, normal component first. $r_n \ge 0$ pushes it up: compression.
-# - $u = (u_n, u_t)$ is the relative displacement. $u_n \ge 0$ is the gap that remains; $u_t$ is the slip.
-#
-# The body is linear, so displacement depends on force by a small symmetric matrix:
+# - $r = (r_n, r_t)$ is the force of the floor on the *upper* body. If $r_n > 0$, the floor pushes the body up, and the
+#   contact is compressed.
+# - $u = (u_n, u_t)$ is the position of the node relative to the floor. $u_n \ge 0$ is the gap that remains, and $u_t$
+#   is the slip: how far the node has moved along the floor.
+
+# %%
+fig, ax = plt.subplots(figsize=(5, 3.4), layout="constrained")
+ax.axhspan(-0.5, 0, color="0.8", lw=0)
+ax.plot([-2, 2.6], [0, 0], "k", lw=1)
+ax.fill([-1.2, 1.2, 1.2, -1.2], [1.3, 1.3, 2.3, 2.3], color="C0", alpha=0.25, lw=0)
+ax.plot([0, 0.15, -0.15, 0.15, -0.15, 0.15, 0], [1.3, 1.15, 1.0, 0.85, 0.7, 0.55, 0.45], "C0", lw=1.5)
+ax.plot(0, 0.4, "o", ms=9, color="C0")
+for tail, head, name, color, at in (
+    ((1.7, 0), (1.7, 0.8), "$n$", "k", (1.78, 0.7)),
+    ((1.7, 0), (2.5, 0), "$t$", "k", (2.4, 0.1)),
+    ((0, -0.42), (0, 0.3), "$r_n$", "C1", (0.08, -0.35)),
+    ((-0.75, 0.4), (-0.12, 0.4), "$r_t$", "C1", (-0.62, 0.48)),
+    ((-1.1, 0), (-1.1, 0.4), "$u_n$", "C2", (-1.45, 0.14)),
+):
+    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
+    ax.text(*at, name, color=color, fontsize=12)
+ax.text(-1.1, 1.75, "elastic body", color="C0")
+ax.text(-1.9, -0.32, "floor", color="0.3")
+ax.set(xlim=(-2, 2.6), ylim=(-0.5, 2.4), aspect="equal")
+ax.axis("off")
+
+# %% [markdown]
+# The arrows show the positive directions. The body is linear, so the displacement depends on the force by a small
+# symmetric matrix:
 #
 # $$ u = Q\,r + q . $$
 #
-# $q$ is where the node would go without any contact force. $Q$ is the *compliance*: column one is the displacement
-# under a unit normal force. Its off-diagonal entry says that pressing also moves the node sideways.
+# The vector $q$ says where the node would go without any contact force. The matrix $Q$ is the *compliance* of the body.
+# Its first column is the displacement under a unit normal force, and its second column the one under a unit tangential
+# force. The entry $Q_{nt}$ off the diagonal says that a normal force also moves the node sideways.
 
 # %%
 Q = np.array([[1.0, 0.4], [0.4, 1.2]])  # mm / N
 q = np.array([-1.0, 0.9])  # mm: without contact the node would sink 1 mm into the floor and move 0.9 mm to the right
 mu = 0.5  # friction coefficient
 
-assert np.all(np.linalg.eigvalsh(Q) > 0)  # every force costs energy
+assert np.all(np.linalg.eigvalsh(Q) > 0)  # every force stores energy in the body
 
 # %% [markdown]
 # ## Signorini: contact without friction is a QP
 #
-# Forget friction for a moment: $r_t = 0$. Contact says three things, called *Signorini's conditions*:
+# Let us leave friction out for a moment, so that $r_t = 0$. Contact then obeys three rules, *Signorini's conditions*:
 #
 # $$ u_n \ge 0, \qquad r_n \ge 0, \qquad u_n\, r_n = 0 . $$
 #
-# No penetration, no glue, and force only where the gap is closed. These are the optimality conditions of
+# The node does not penetrate the floor, the floor does not pull on the node, and there is a force only where the gap is
+# closed. These rules are the optimality conditions of the quadratic program
 #
 # $$ \min_{r_n \ge 0} \; \tfrac12 Q_{nn} r_n^2 + q_n r_n . $$
 #
-# Why? The derivative of the cost is $Q_{nn} r_n + q_n = u_n$. At the minimum it is zero if $r_n > 0$, and must not be
-# negative if $r_n = 0$. **The multiplier of the constraint is the gap.**
+# To see this, take the derivative of the cost. It is $Q_{nn} r_n + q_n$, which is the gap $u_n$. At the minimum this
+# derivative is zero if $r_n > 0$, and it is not negative if $r_n = 0$. **The multiplier of the constraint is the gap.**
 
 # %%
 r_n = cp.Variable()
@@ -65,7 +93,8 @@ assert np.isclose(r_n.value, 1.0)  # = -q_n / Q_nn
 assert np.isclose(push.dual_value, 0.0, atol=1e-6)
 
 # %% [markdown]
-# Lift the body by 3 mm and solve again. Nothing touches, the force is zero, and the multiplier is the gap of 2 mm.
+# Now lift the body by 3 mm and solve again. The node no longer touches the floor. The force is zero, and the multiplier
+# is the gap of 2 mm.
 
 # %%
 lifted = cp.Problem(cp.Minimize(Q[0, 0] * r_n**2 / 2 + (q[0] + 3.0) * r_n), [push])
@@ -77,17 +106,18 @@ assert np.isclose(push.dual_value, 2.0, atol=1e-5)
 # %% [markdown]
 # ## Coulomb's law
 #
-# Friction may hold the node back, but only so much: $|r_t| \le \mu\, r_n$. If the node moves, friction uses all it has,
-# against the motion:
+# Friction can hold the node back, but its force is bounded: $|r_t| \le \mu\, r_n$. If the node moves, the friction force
+# reaches this bound, and it points against the motion:
 #
 # $$ u_t \ne 0 \;\Rightarrow\; r_t = -\mu\, r_n\, \frac{u_t}{|u_t|} . $$
 #
-# If the normal force were known, the bound $g = \mu r_n$ would be a number and friction would again be a QP:
+# If the normal force were known, the bound $g = \mu r_n$ would be a number, and friction would again be a QP:
 #
 # $$ \min_{|r_t| \le g} \; \tfrac12 Q_{tt} r_t^2 + (q_t + Q_{tn} r_n)\, r_t . $$
 #
-# The derivative is now the slip $u_t$. It vanishes inside the interval: *stick*. At an end it points outwards, against
-# the force: *slip*. So solve the two QPs in turn, each with the other's answer. This is the *alternating iteration*.
+# The derivative of this cost is the slip $u_t$. If the minimum lies inside the interval, the derivative vanishes and the
+# node *sticks*. If the minimum lies at an end of the interval, the node *slips*, and the force at that end is opposite to
+# the slip. The *alternating iteration* solves the two QPs in turn, each with the other's last answer.
 
 # %%
 force = cp.Variable(2)
@@ -109,20 +139,48 @@ print(np.round(path[:5], 4), "...", np.round(path[-1], 4))
 assert np.allclose(path[-1], [1.25, -0.625], atol=1e-5)
 
 # %% [markdown]
-# Each pair of QPs brings the answer closer, by the same factor every time: $\mu\, Q_{nt} / Q_{nn} = 0.2$. With more
-# friction or more coupling the factor passes one and the iteration fails. [Tutorial 5](no_one_or_three_solutions.py) is
-# about that.
+# Each pair of QPs brings the answer closer by the same factor. While the node slips to the right, the friction force is
+# $r_t = -\mu r_n$, so an error in $r_n$ comes back multiplied by the slope $+\mu\, Q_{nt} / Q_{nn} = 0.2$.
 
 # %%
 error = np.abs(path[:6, 0] - 1.25)
 assert np.allclose(error[1:] / error[:-1], mu * Q[0, 1] / Q[0, 0], rtol=1e-2)
 
 # %% [markdown]
+# Does more friction push this factor beyond one, so that the iteration fails? For this load it does not. From
+# $\mu = 0.84$ on the node sticks. Then the friction force no longer depends on $\mu$, and the factor is
+# $Q_{nt}^2 / (Q_{nn} Q_{tt}) = 0.13$, which is below one for every positive definite $Q$.
+#
+# The iteration can fail where the node keeps slipping. Pull it hard to the *left*, with $q = (-1, -5)$. Now
+# $r_t = +\mu r_n$, and the slope is negative, $-\mu\, Q_{nt} / Q_{nn}$: the error changes its sign in every iteration. At
+# $\mu = 2.6$ the slope is $-1.04$, and the iteration jumps to and fro for ever, although the problem has exactly one
+# solution.
+
+# %%
+for much in (0.84, 2.6, 3.0, 10.0):
+    sticking = solve(InterfaceProblem(Q, [q], much), "alternating")
+    assert sticking.solved and sticking.iterations <= 12
+    assert np.allclose(sticking.reactions, -np.linalg.solve(Q, q), atol=1e-6)  # u = 0: the node sticks
+assert Q[0, 1] ** 2 / (Q[0, 0] * Q[1, 1]) < 0.14
+
+for much in (0.5, 2.4, 2.6):
+    pulled = InterfaceProblem(Q, [[-1.0, -5.0]], much)
+    answer, exact = solve(pulled, "alternating"), all_solutions(pulled)
+    print(f"pulled to the left, mu = {much}: {answer.status}, slope {-much * Q[0, 1] / Q[0, 0]:.2f}")
+    assert len(exact) == 1 and np.isclose(exact[0].reactions[0, 1], much * exact[0].reactions[0, 0])  # it slips
+    assert answer.solved == (much < 2.5)
+
+# %% [markdown]
+# Two things must be told apart. A slope of $-1$ is the end of this *iteration*, but the solution stays unique, and other
+# methods find it. A slope of $+1$ is the end of *uniqueness*: there are loads with several solutions, whatever the method.
+# [Tutorial 5](no_one_or_three_solutions.py) shows both.
+
+# %% [markdown]
 # ## Both at once: an SOCP
 #
-# The admissible forces form a cone, $K = \{\,|r_t| \le \mu\, r_n\}$. In 3D the tangential force has two components, the
-# cone is round, and the constraint is a second-order cone; we write it so that it would work there too. Minimise the
-# energy over the cone:
+# The forces that Coulomb's law admits form a cone, $K = \{\,|r_t| \le \mu\, r_n\}$. In 3D the tangential force has two
+# components, the cone is round, and the constraint is called a second-order cone. We write it in a form that would work in
+# 3D too, and minimise the energy over the cone:
 
 # %%
 r = cp.Variable(2)
@@ -138,13 +196,13 @@ print(f"force {np.round(r.value, 3)}, slip {u[1]:.3f}, gap {u[0]:.3f} = mu |slip
 assert np.isclose(u[0], mu * abs(u[1]), atol=1e-5)
 
 # %% [markdown]
-# Look at the gap. The node slips, presses on the floor, and floats above it by $\mu |u_t|$! The minimum over the cone
-# obeys another law, *associated friction*: what slips also opens. It is convex, so it always has an answer, but it is
-# not Coulomb's. (We left the shift at zero.)
+# Look at the gap. The node slips and presses on the floor, and yet it floats above the floor by $\mu |u_t|$. The minimum
+# over the cone obeys another law, *associated friction*, in which a contact that slips also opens. This program is convex,
+# so it always has an answer, but the answer is not Coulomb's. (We have left the shift in the cost at zero.)
 #
-# The cure, due to Acary and Cadoux: raise the floor by exactly what the cone adds. With $s = |u_t|$ and the cost
-# $\mu s\, r_n$ added, the optimality condition becomes $u_n + \mu s = \mu |u_t|$, hence $u_n = 0$. We do not know $s$
-# beforehand, so we repeat.
+# Acary and Cadoux found the cure: we shift the gap by exactly what the cone adds to it. With $s = |u_t|$ and the term
+# $\mu s\, r_n$ added to the cost, the optimality condition becomes $u_n + \mu s = \mu |u_t|$, and therefore $u_n = 0$. The
+# slip $s$ is not known beforehand, so we solve the program again and again, each time with the last slip.
 
 # %%
 for _ in range(12):
@@ -159,17 +217,17 @@ assert np.isclose(u[0], 0.0, atol=1e-5)
 # %% [markdown]
 # ## No iteration at all: a complementarity problem
 #
-# In 2D the friction law has finitely many cases, and all of it can be written as pairs of numbers that are not
-# negative, with at least one of each pair zero:
+# In 2D the friction law has finitely many cases. It can be written as pairs of numbers that are not negative, and of
+# which at least one is zero:
 #
 # | $z \ge 0$ | complementary to | says |
 # |---|---|---|
 # | $r_n$ | $u_n$ | Signorini |
-# | $x = r_t + \mu r_n$ | $u_t + y$ | to the right only if friction pulls left with all its force |
-# | $y$ | $2\mu r_n - x = \mu r_n - r_t$ | to the left, $u_t = -y$, only if it pulls right with all its force |
+# | $x = r_t + \mu r_n$ | $u_t + y$ | the node slips to the right only if friction pulls left with all its force |
+# | $y$ | $2\mu r_n - x = \mu r_n - r_t$ | it slips to the left, $u_t = -y$, only if friction pulls right with all its force |
 #
-# "At least one of each pair is zero" is a yes-or-no question. A binary $b$ per pair asks it, with a number $M$ that is
-# larger than anything in the answer. A mixed-integer solver answers.
+# Which number of a pair is zero is a question with two answers. One binary variable $b$ for each pair asks it, with the
+# help of a number $M$ that is larger than anything in the answer. A mixed-integer solver finds the answer.
 
 # %%
 z, b, M = cp.Variable(3, nonneg=True), cp.Variable(3, boolean=True), 10.0
@@ -181,8 +239,8 @@ complementarity.solve(solver=cp.SCIPY)
 assert np.allclose(reaction.value, [1.25, -0.625], atol=1e-6)
 
 # %% [markdown]
-# Three programs, one answer. The same from `contactopt`, which also says how good it is. The *certificate* is the
-# natural-map residual: zero exactly at the solutions of Coulomb's problem, and computed from the problem alone.
+# Three programs have given one answer. `contactopt` gives it too, and also says how good it is. The *certificate* is the
+# natural-map residual. It is zero exactly at the solutions of Coulomb's problem, and it is computed from the problem alone.
 
 # %%
 problem = InterfaceProblem(Q, [q], mu)  # one row of q per contact
@@ -197,8 +255,9 @@ assert len(all_solutions(problem)) == 1  # the complementarity problem has no ot
 # %% [markdown]
 # ## More friction, less slip
 #
-# Raise $\mu$ and watch. The slip falls to zero at $\mu = |r_t| / r_n$ of the sticking node, which is
-# $r = -Q^{-1} q = (1.5, -1.25)$. From there on friction has more than it needs, and nothing changes any more.
+# Let us raise $\mu$. A node that sticks has $u = 0$, so its force is $r = -Q^{-1} q = (1.5, -1.25)$. The slip falls to
+# zero at $\mu = |r_t| / r_n = 1.25 / 1.5$. From there on friction could carry more than it has to, and nothing changes any
+# more.
 
 # %%
 coefficients = np.linspace(0, 1.2, 61)
@@ -221,8 +280,8 @@ assert all(answer.solved for answer in answers)
 assert np.all((slips > 1e-6) == (coefficients < 1.25 / 1.5))
 
 # %% [markdown]
-# The same with a slider. Every position of it is a certified answer; the page only draws. (The cell makes a few
-# lines of HTML, so the slider also works in a saved page, without Python.)
+# Here is the same with a slider. Every position of the slider shows an answer that was computed and certified above; the
+# page only draws it. (The cell makes a few lines of HTML, so the slider also works in a saved page, without Python.)
 
 # %% tags=["hide-input"]
 PAGE = """
@@ -281,8 +340,8 @@ Slider(rows, start=25)
 # %% [markdown]
 # ## Exercises
 #
-# **1.** Press harder: $q = (-2, 0.9)$. From which $\mu$ on does the node stick? Guess first: more or less friction than
-# before?
+# **1.** Press harder: $q = (-2, 0.9)$. From which $\mu$ on does the node stick? Guess first whether it needs more or less
+# friction than before.
 #
 # <details><summary>Solution</summary>
 #
@@ -332,7 +391,8 @@ Slider(rows, start=25)
 # <details><summary>Solution</summary>
 #
 # The friction force $r_t < 0$ contributes $Q_{nt} r_t$ to the gap. With $Q_{nt} > 0$ it pulls the node into the floor,
-# which presses back harder. With $Q_{nt} < 0$ it lifts the node and the normal force falls.
+# which presses back harder: the slope $\mu Q_{nt} / Q_{nn}$ is positive. With $Q_{nt} < 0$ it lifts the node, the normal
+# force falls, and the slope is negative.
 #
 # ```python
 # flipped = solve(InterfaceProblem(Q * [[1, -1], [-1, 1]], [q], mu))

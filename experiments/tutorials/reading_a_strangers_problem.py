@@ -2,9 +2,9 @@
 # # 8. Reading a stranger's problem: FCLib
 #
 # FCLib is a collection of friction problems from real simulations: boxes in a stack, grains in a silo, a wall of
-# bricks. It is also a file format (HDF5), so that people with different codes can argue about the same problem. This
-# tutorial plays both sides: a stranger writes a file, with no help from this package, and we read it, look at it, solve
-# it, and write one back.
+# bricks. It is also a file format (HDF5), by which people with different codes can work on the same problem. In this
+# tutorial a stranger writes such a file without any help from this package. We read the file, look at the problem, solve it,
+# and write a file back.
 #
 # Reading time: 10 minutes. You need `h5py` (`pip install 'contactopt[fclib]'`).
 
@@ -16,24 +16,34 @@ import h5py
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import InputError, InterfaceProblem, diagnose, fclib, natural_map_residual, reduce, scenes, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    diagnose,
+    fclib,
+    natural_map_residual,
+    reduce,
+    scenes,
+    siconos_residual,
+    solve,
+)
 
 folder = TemporaryDirectory()
 
 # %% [markdown]
 # ## The stranger
 #
-# A rigid cube, 1 m wide and 1 kg heavy, slides over a floor at 0.5 m/s to the right and 0.2 m/s away from us. It
-# touches the floor with its four lower corners. The stranger takes a time step of 0.05 s.
+# A rigid cube has edges of 1 m and a mass of 1 kg. It slides over a floor at 0.5 m/s to the right and 0.2 m/s away from us,
+# and touches the floor with its four lower corners. The stranger takes a time step of 0.05 s.
 #
-# His unknowns are *velocities* $v$ (three of the centre, three of rotation) and *impulses* $r$. FCLib's global form
-# reads
+# The stranger's unknowns are *velocities* $v$ (three of the centre and three of rotation) and *impulses* $r$. The letters
+# here are those of FCLib, whose global form reads
 #
 # $$ M v = H r + f, \qquad u = H' v + w . $$
 #
-# $M$ is the mass, $f$ the momentum that the cube has and that gravity adds, and $H'$ takes the motion of the cube to
-# the velocities $u$ of its corners. Signs are ours: $n$ points out of the floor, $r_n \ge 0$ pushes the cube up, each
-# corner's block is normal first.
+# $M$ is the mass matrix. $f$ is the momentum that the cube has, together with what gravity adds to it in the step. $H'$ takes
+# the motion of the cube to the velocities $u$ of its corners. The signs are those of this package: $n$ points out of the
+# floor, $r_n \ge 0$ pushes the cube up, and the block of each corner has its normal component first.
 
 # %%
 M = np.diag([1.0, 1.0, 1.0, 1 / 6, 1 / 6, 1 / 6])  # kg and kg m^2
@@ -62,10 +72,11 @@ with h5py.File(path, "w") as file:
     cube["vectors/f"], cube["vectors/w"], cube["vectors/mu"] = f, np.zeros(12), np.full(4, 0.3)
 
 # %% [markdown]
-# ## Us
+# ## Reading the file
 #
-# One line reads it. The result is the same type as the problems from finite elements, because the mathematics is the
-# same: the motion is eliminated, $u = W r + q$ with $W = H' M^{-1} H$ and $q = H' M^{-1} f + w$. We call $W$ our $Q$.
+# One line reads the file. The result has the same type as the problems that come from finite elements, because the
+# mathematics are the same. The motion is eliminated, so that $u = W r + q$ with $W = H' M^{-1} H$ and
+# $q = H' M^{-1} f + w$. What FCLib calls $W$ is called $Q$ here.
 
 # %%
 problem = fclib.read(path)
@@ -79,7 +90,7 @@ assert np.all(problem.q[:, 0] < 0)  # without contact all corners would sink in:
 # %% [markdown]
 # ## Ask before you solve
 #
-# An unknown problem deserves a look first.
+# It is wise to look at an unknown problem first.
 
 # %%
 print(diagnose(problem))
@@ -87,9 +98,9 @@ print(diagnose(problem))
 assert np.linalg.matrix_rank(problem.Q) == 6
 
 # %% [markdown]
-# Rank 6 of 12: a rigid cube has six ways to move, but four corners have twelve components. A table on four legs: nobody
-# can say how much each leg carries. So the impulses are *not unique*, whatever the friction. Solvers that trust a
-# positive definite matrix may fail here.
+# The matrix has rank 6 only, and 12 rows: a rigid cube can move in six ways, but four corners have twelve components. It is
+# like a table on four legs, where nobody can say how much each leg carries. So the impulses are *not unique*, whatever the
+# friction is. Solvers that need a positive definite matrix may fail here.
 #
 # ## Solve
 
@@ -120,9 +131,10 @@ spread = np.ptp([answer.reactions[:, 0] for answer in answers.values()], axis=0)
 assert spread.max() > 0.005
 
 # %% [markdown]
-# Four methods, different impulses, and the *same motion*: friction takes $\mu g$ times the time step off the speed, in
-# the direction of the motion. The front corners carry more, because friction at the floor tips the cube forwards. All
-# four answers carry the certificate. It asks whether the laws hold, not whether an answer looks like another.
+# The four methods find different impulses, but the *same motion*: friction takes $\mu g$ times the time step off the speed,
+# against the direction of the motion. The front corners carry more, because friction at the floor tips the cube forwards.
+# All four answers are certified, because the certificate asks whether the laws hold, and not whether one answer looks like
+# another.
 #
 # ## Two ways to measure
 #
@@ -133,7 +145,7 @@ assert spread.max() > 0.005
 r = answers["nsgs"].reactions
 for label, unit in (("kg", 1.0), ("g", 1e3)):
     same = InterfaceProblem(problem.Q / unit, problem.q, problem.mu)
-    ours, published = natural_map_residual(same, unit * r), natural_map_residual(same, unit * r, rho=1.0)
+    ours, published = natural_map_residual(same, unit * r), siconos_residual(same, unit * r)
     print(f"in {label:2}: certificate {ours:.2e}, with rho = 1 {published:.2e}")
     if unit == 1.0:
         first = ours, published
@@ -144,9 +156,9 @@ assert published < 0.1 * first[1]
 # %% [markdown]
 # ## Write one back
 #
-# Our elastic problems fit into the local form, $u = W r + V \lambda + q$: a block that a plate presses down brings a
-# balance, which FCLib calls the equality part of its mixed form. The numbers survive to the last bit. Coordinates and
-# nodal areas are not part of the format and are lost.
+# Elastic problems fit into the local form, $u = W r + V \lambda + q$. A block that a plate presses down brings a balance of
+# forces with it, which FCLib calls the equality part of its mixed form. All numbers are kept to the last bit. Coordinates
+# and nodal areas are not part of the format and are lost.
 
 # %%
 block = reduce(scenes.flat_punch(3, elements=2, mu=0.2))
@@ -161,7 +173,7 @@ assert np.array_equal(back.V, block.V) and np.array_equal(back.s, block.s)
 assert np.isclose(solve(back).reactions[:, 0].sum(), 100.0)
 
 # %% [markdown]
-# A file that is broken is refused with a sentence that names it.
+# A broken file is refused with a sentence that names it.
 
 # %%
 Path(folder.name, "broken.hdf5").write_bytes(b"not an HDF5 file")
@@ -180,8 +192,9 @@ folder.cleanup()
 #
 # <details><summary>Solution</summary>
 #
-# The friction impulse that would stop the motion to the right, 0.5 N s, acts half a metre below the centre. The normal
-# impulse, 0.4905 N s, acts at most half a metre in front of it: not quite enough. Both rear corners lift off, slowly.
+# The friction impulse that would stop the motion to the right is 0.5 N s, and it acts half a metre below the centre. The
+# normal impulse is 0.4905 N s, and it acts at most half a metre in front of the centre, which is not quite enough. Both rear
+# corners lift off slowly.
 #
 # ```python
 # rough = InterfaceProblem(problem.Q, problem.q, 2.0)
@@ -200,8 +213,8 @@ folder.cleanup()
 #
 # <details><summary>Solution</summary>
 #
-# Press one diagonal of the table down and lift the other: $(1, -1, -1, 1)$ in the normal components has no resultant
-# and no moment. It is in the kernel of $Q$.
+# Press one diagonal of the table down and lift the other one. The change $(1, -1, -1, 1)$ of the normal components has no
+# resultant and no moment. It is in the kernel of $Q$.
 #
 # ```python
 # twist = np.zeros((4, 3))

@@ -1,9 +1,10 @@
 # %% [markdown]
 # # 3. The circulant preconditioner and why it works
 #
-# [Tutorial 2](from_bodies_to_compliance.py) found that the compliance $Q$ divides a wave by its wave number $|\xi|$. So
-# multiplying by $|\xi|$ nearly undoes $Q$, and Fourier's transform multiplies by $|\xi|$ in no time. That is the whole
-# idea. Here we write such a preconditioner in five lines, compare it with the paper's, and count iterations.
+# [Tutorial 2](from_bodies_to_compliance.py) found what the compliance $Q$ does to a wave of force: it makes a wave of
+# displacement out of it, divided by the wave number $|\xi|$. So whoever multiplies a displacement by $|\xi|$ nearly
+# undoes $Q$, and Fourier's transform multiplies by $|\xi|$ at almost no cost. That is the whole idea. In this tutorial we
+# write such a preconditioner in a few lines, compare it with those of the paper, and count iterations.
 #
 # Reading time: 10 minutes. You need the conjugate gradient method (CG) and the discrete Fourier transform (FFT).
 
@@ -19,9 +20,9 @@ from contactopt.solving.preconditioners import preconditioner
 # %% [markdown]
 # ## The problem of size
 #
-# The two blocks of tutorial 2: a punch, 4 mm wide and high, on a foundation, 16 mm x 8 mm. We ask CG for the forces
-# that close a given gap, $Q r = b$: contact everywhere, no inequality. That is the linear system inside every contact
-# solver.
+# We take the two blocks of tutorial 2: a punch, 4 mm wide and 4 mm high, stands on a foundation, 16 mm wide and 8 mm high.
+# We ask CG for the forces $r$ that close a given gap $b$, that is, for the solution of $Q r = b$. All nodes are in contact
+# here, and there is no inequality. Every contact solver has such a linear system inside.
 
 
 # %%
@@ -51,16 +52,19 @@ print("CG iterations without preconditioner:", plain)
 assert plain[129] > 2 * plain[17]
 
 # %% [markdown]
-# The condition number $\kappa$ doubles when the nodes double. CG needs about $\sqrt\kappa$ iterations, so every
-# refinement costs half as many again, on top of a larger product. A preconditioner $P \approx Q^{-1}$ lets CG work on
-# $P Q$ instead.
+# The condition number $\kappa$ doubles when the number of nodes doubles. CG needs about $\sqrt\kappa$ iterations, so every
+# refinement takes about 1.4 times as many iterations, and each of them has a larger product. A preconditioner
+# $P \approx Q^{-1}$ lets CG work on $P Q$ instead.
+#
+# What is $P$ applied to? In every iteration CG applies it to the residual $b - Q r$. This vector is a gap that has not been
+# closed yet, so it is a *displacement*, and $P$ answers with the *force* that would about close it.
 #
 # ## Five lines
 #
-# A *circulant* matrix is one whose rows are shifted copies of each other, the last entry going round to the front. The
-# FFT diagonalises all circulants at once: their eigenvalues, as a function of the wave number, are called the *symbol*.
-# We choose the symbol $|\xi|$ freely. The contact line is no circle, so we extend the force by zeros to a closed curve
-# of $2m$ nodes and cut the result off again.
+# A *circulant* matrix is one whose rows are shifted copies of each other, where the last entry goes round to the front.
+# The FFT diagonalises all circulants at once. Their eigenvalues, as a function of the wave number, are called the
+# *symbol*. We choose the symbol $|\xi|$. The contact line is not a circle, so we extend the displacement by zeros to a
+# closed curve of $2m$ nodes, and cut off what the product yields there.
 
 
 # %%
@@ -69,8 +73,8 @@ def multiply_by_wave_number(nodes):
     xi = np.minimum(np.arange(2 * m), 2 * m - np.arange(2 * m)).astype(float)
     xi[0] = 0.5  # constants: a little, so that P can be inverted
 
-    def product(r):
-        components = r.reshape(nodes, 2)  # normal and tangential, each by itself
+    def product(displacement):
+        components = displacement.reshape(nodes, 2)  # normal and tangential, each by itself
         return np.fft.ifft(xi[:, None] * np.fft.fft(components, n=2 * m, axis=0), axis=0).real[:nodes].ravel()
 
     return LinearOperator((2 * nodes, 2 * nodes), matvec=product)
@@ -83,8 +87,8 @@ assert all(ours[nodes] < plain[nodes] for nodes in problems)
 assert ours[129] <= ours[17] + 4
 
 # %% [markdown]
-# The count hardly moves any more. One application costs two FFTs, $O(N \log N)$, while a product with a dense $Q$ costs
-# $N^2$. So the preconditioner is nearly free.
+# The number of iterations hardly changes with the mesh any more. One application costs two FFTs, which are
+# $O(N \log N)$ operations, while a product with a dense $Q$ costs $N^2$. So the preconditioner is nearly free.
 #
 # ## Three that come with the package
 #
@@ -94,8 +98,9 @@ assert ours[129] <= ours[17] + 4
 # | `p22` | the paper's equation 26: the inverse of a sparse circulant form of $Q$ itself |
 # | `neumann` | the square root of the Laplacian of the contact line, by the cosine transform |
 #
-# "Sparse" is the paper's trick. Its circulant has about $\log_2 N$ entries per row, so it needs no FFT. Its symbol is
-# not $|\xi|$ but stays near it. Let us see: feed each one with waves and measure how much it multiplies them.
+# That its circulant is sparse is the paper's trick. It has about $\log_2 N$ entries per row, so it needs no FFT. Its symbol
+# is not $|\xi|$, but it stays near it. To see this, we give waves of displacement to each preconditioner and measure by
+# how much it multiplies them.
 
 # %%
 nodes = 129
@@ -108,9 +113,9 @@ choices |= {name: preconditioner(problem, name) for name in ("p21", "p22", "neum
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
 number = np.arange(1, nodes)
 for name, P in choices.items():
-    normal = np.zeros((2 * nodes, nodes))
-    normal[::2] = waves  # waves of normal force only
-    symbol = np.sum(waves * (P @ normal)[::2], axis=0)[1:]
+    displacement = np.zeros((2 * nodes, nodes))
+    displacement[::2] = waves  # waves of normal displacement only
+    symbol = np.sum(waves * (P @ displacement)[::2], axis=0)[1:]
     symbol *= np.exp(-np.mean(np.log(symbol / number)))  # CG does not see a factor
     ax.loglog(number, symbol, label=name)
     assert np.all((symbol / number > 0.2) & (symbol / number < 5))
@@ -119,9 +124,9 @@ ax.set(xlabel="number of the wave [-]", ylabel="what the preconditioner multipli
 ax.legend(frameon=False)
 
 # %% [markdown]
-# All follow the diagonal within a constant factor, and that is all it takes: if $c_1 |\xi| \le$ symbol $\le c_2 |\xi|$
-# then the condition number of $P Q$ is at most about $c_2 / c_1$, on every mesh. This is what *spectrally equivalent*
-# means.
+# All of them follow the dashed line within a constant factor, and no more is needed. If $c_1 |\xi| \le$ symbol
+# $\le c_2 |\xi|$, then the condition number of $P Q$ is at most about $c_2 / c_1$ on every mesh. This is what *spectrally
+# equivalent* means.
 #
 # ## Count
 
@@ -146,12 +151,24 @@ assert all(counts["neumann"][k] <= counts[name][k] for k in problems for name in
 # %% [markdown]
 # ## Why are they not all the same?
 #
-# At the ends of the line. The extension by zero cuts a force off where the contact ends; the $H^{1/2}$ norm punishes
-# that jump, by a factor that grows like $\log^2 N$. But the traction at the edge of a contact does not go to zero: it
-# is even singular. The cosine transform does not extend anything. It continues a force by its mirror image, without a
-# jump.
-#
-# Look at the eigenvalues of $P Q$. They should crowd into a small interval.
+# They differ at the ends of the line. Our five lines and `p21` extend the displacement by zero. That does no harm to a
+# displacement that vanishes where the contact ends; such functions form the space $H^{1/2}_{00}$. But the displacement does
+# not vanish there: a uniform pressure, for instance, moves the nodes at the edge nearly as far as those in the middle. So
+# the extension by zero makes a jump at each end, and the $H^{1/2}$ norm of a jump is infinite. On a mesh it is finite, but
+# it grows slowly with the number of nodes. The other two avoid the jump. `neumann` continues the displacement by its mirror
+# image. `p22` is the inverse of a matrix that acts on forces, and outside the contact the force *is* zero.
+
+# %%
+pressed = np.zeros((nodes, 2))
+pressed[:, 0] = problem.areas  # a uniform pressure
+under_pressure = (problem.Q @ pressed.ravel()).reshape(nodes, 2)[:, 0]
+ends = under_pressure[[0, -1]] / under_pressure.max()
+print("normal displacement at the ends over the largest:", ends.round(2))
+
+assert np.all(ends > 0.5)  # no sign of a zero at the edge
+
+# %% [markdown]
+# Now look at the eigenvalues of $P Q$. They should lie close together.
 
 # %%
 fig, ax = plt.subplots(figsize=(7, 3.2), layout="constrained")
@@ -172,44 +189,57 @@ print("without the largest eigenvalue:", {name: f"{value:.1f}" for name, value i
 values, vectors = np.linalg.eig(PQ)
 motion = (problem.Q @ vectors[:, np.argmax(values.real)].real).reshape(nodes, 2)
 
+
+def spread(nodes, name):
+    """Largest but one over smallest eigenvalue of P Q."""
+    P = multiply_by_wave_number(nodes) if name == "five lines" else preconditioner(problems[nodes], name)
+    eigenvalues = np.sort(np.linalg.eigvals(P @ problems[nodes].Q).real)
+    return eigenvalues[-2] / eigenvalues[0]
+
+
+growth = {name: spread(129, name) / spread(17, name) for name in ("five lines", "p21", "p22", "neumann")}
+print("growth of that from 17 to 129 nodes:", {name: f"{value:.2f}" for name, value in growth.items()})
+
 assert all(without_largest[name] < 0.5 * condition[name] for name in spectra)
+assert min(growth["five lines"], growth["p21"]) > 1.5  # the displacement extended by zero
+assert max(growth["p22"], growth["neumann"]) < 1.2  # no jump
 assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(motion[:, 1])  # sideways, the same everywhere
 
 # %% [markdown]
-# One eigenvalue stands apart, on the right, for all three. It is the *sway* of the punch: a motion of the whole body,
-# which no symbol of the surface can know. CG needs one or two more iterations to deal with it, not many. That is why
-# the condition number is a pessimist here, and why it pays to solve for such a motion exactly
-# (`contactopt.solving.preconditioners.deflated`).
+# For all three, one eigenvalue stands apart on the right. It belongs to the *sway* of the punch, a motion of the whole
+# body. The symbol describes waves on the surface and knows nothing about it. CG needs only one or two more iterations to
+# deal with a single eigenvalue, so the condition number says less about CG than it seems to. It still pays to solve for
+# such a motion exactly (`contactopt.solving.preconditioners.deflated`), as the last exercise shows.
 #
 # ## Exercises
 #
-# **1.** A first guess of many is to divide by the diagonal, $P = \mathrm{diag}(Q)^{-1}$. Try it. Why does it not help?
+# **1.** Many would first try to divide by the diagonal, $P = \mathrm{diag}(Q)^{-1}$. Try it. Why does it not help?
 #
 # <details><summary>Solution</summary>
 #
-# The diagonal is nearly constant: all nodes are alike except at the edge. Dividing by a constant changes nothing for
-# CG.
+# The diagonal is nearly constant, because all nodes but those at the edge are alike. To divide by a constant changes
+# nothing for CG.
 #
 # ```python
-# jacobi = LinearOperator((2 * nodes,) * 2, matvec=lambda r: r / np.diag(problem.Q))
+# jacobi = LinearOperator((2 * nodes,) * 2, matvec=lambda b: b / np.diag(problem.Q))
 # assert iterations(problem.Q, jacobi) > 0.7 * plain[nodes]
 # ```
 #
 # </details>
 #
-# **2.** Show that $|\xi|$ is right, and not $|\xi|^{1/2}$ or $|\xi|^2$: try powers.
+# **2.** Show that $|\xi|$ is the right symbol, rather than $|\xi|^{1/2}$ or $|\xi|^2$: try several powers.
 #
 # <details><summary>Solution</summary>
 #
-# Powers below one leave a growing symbol, powers above one turn it round.
+# Under a power below one, short waves remain too small in $P Q$; under a power above one, they become too large.
 #
 # ```python
 # def power(exponent):
 #     m = 128 * 2
 #     xi = np.maximum(np.minimum(np.arange(2 * m), 2 * m - np.arange(2 * m)), 0.5) ** exponent
 #
-#     def product(r):
-#         waves = np.fft.fft(r.reshape(nodes, 2), n=2 * m, axis=0)
+#     def product(displacement):
+#         waves = np.fft.fft(displacement.reshape(nodes, 2), n=2 * m, axis=0)
 #         return np.fft.ifft(xi[:, None] * waves, axis=0).real[:nodes].ravel()
 #
 #     return LinearOperator((2 * nodes, 2 * nodes), matvec=product)

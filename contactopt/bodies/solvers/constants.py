@@ -9,10 +9,10 @@ from __future__ import annotations
 PARDISO_FROM = 5_000  # unknowns of a 3D body from which PARDISO is faster than SuperLU
 FACTORS_UP_TO = {"superlu": 100_000, "pardiso": 200_000}  # unknowns of a 3D body that is factorised
 
-# `python -m experiments.solver_constants` compares the elimination orders.
+# `python -m experiments.questions.solver_constants` compares the elimination orders.
 LEAF = 48  # nodes of a piece of the mesh that nested dissection does not cut further
 
-# `python -m experiments.solver_constants` varies one of these at a time.
+# `python -m experiments.questions.solver_constants` varies one of these at a time.
 COARSEST = 60  # nodes or aggregates that multigrid does not coarsen further
 NEAR = 1.5  # neighbours at up to this multiple of the least distance are aggregated
 DEGREE = 3  # products with A in the smoother, which is a polynomial of this degree less one

@@ -1,6 +1,6 @@
 """Products of a sparse matrix with a vector, by oneMKL where pypardiso has installed it and by SciPy elsewhere.
 
-One oneMKL product of single precision is faster than one of SciPy (`python -m experiments.solver_constants`).
+One oneMKL product of single precision is faster than one of SciPy (`python -m experiments.questions.solver_constants`).
 Neither holds Python's lock.
 """
 

@@ -29,7 +29,7 @@ import numpy as np
 from contactopt.checks import real_array
 from contactopt.errors import InputError
 
-PRESSED = 1e-10  # normal forces above this, relative to the largest, are contact
+PRESSED = 1e-8  # normal forces below this fraction of the largest are rounding: the contact is open
 BELOW = 1e-6  # a tangential force sticks if it is below its bound by more than this, relative to the bound
 
 Projected = tuple[np.ndarray, np.ndarray]  # points (k, dim) and the generalised derivative (k, dim, dim)
@@ -147,9 +147,9 @@ class Law:
         return self.nearest(shifted, r[:, 0])
 
     def pressed(self, r: np.ndarray) -> np.ndarray:
-        """(k,) mask of the contacts that carry a normal force beyond rounding."""
+        """(k,) mask of the contacts that touch: they carry a normal force beyond rounding, or cannot open."""
         size = np.abs(r[:, 0])
-        return np.asarray(size > PRESSED * size.max(initial=0.0))
+        return np.asarray((size > PRESSED * size.max(initial=0.0)) | (self.lowest < 0))
 
     def sticking(self, r: np.ndarray) -> np.ndarray:
         """(k,) mask of the pressed contacts whose tangential force is below its bound."""

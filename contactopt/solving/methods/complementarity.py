@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -35,6 +36,8 @@ class Lemke:
 
     def solves(self, law: Law) -> bool:
         return law.unilateral and law.proportional and not law.dilatant
+
+    unsymmetric: ClassVar[bool] = True
 
     def backends(self, dim: int) -> tuple[str, str]:
         if dim != 2:

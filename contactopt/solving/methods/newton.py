@@ -42,6 +42,7 @@ class Newton:
     linear: str | None = None
     preconditioner: str | None = None
     implicit: ClassVar[bool] = True  # takes an operator for Q
+    unsymmetric: ClassVar[bool] = True  # and one that is not symmetric
 
     def __post_init__(self) -> None:
         if self.linear not in (None, "dense", "krylov"):

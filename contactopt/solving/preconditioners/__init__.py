@@ -7,7 +7,9 @@ up to a factor that no iteration sees. P21 resembles S1 + S2; the matrix that P2
 the sum of P21 along both directions of the contact surface is P31 (29). Extension by zero belongs to functions that
 vanish at the ends (H00^1/2), which a traction at a free edge does not:
     `neumann`, the square root of the Laplacian of the contact line or surface by cosine transforms (contactopt.solving.preconditioners.neumann),
-needs no extension. Each acts on every component by itself. What is left are a few smooth motions of the two bodies against
+needs no extension. A contact line that is closed by itself needs none for P21 and P22 either: the circulant matrices act
+on its own nodes. Contacts are found on their line or grid in the problem's chart, so that it does not matter how the
+bodies are turned. Each preconditioner acts on every component by itself. What is left are a few smooth motions of the two bodies against
 each other, first of all the sway of a slender body: `deflated` solves for them exactly (balancing, Mandel 1993).
 
 Restriction to an active set A: the paper takes the rows and columns A of P. Where P = G^-1 with a cheap product G, which
@@ -76,7 +78,8 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
     """The named approximate inverse of problem.Q, (k dim, k dim).
 
     Uses of Q only its mean diagonal and which components cannot move.
-    Raises InputError for an unknown name, fewer than 3 contacts a side, or contacts not on a line or rectangular grid.
+    Raises InputError for an unknown name, fewer than 3 contacts a side, or contacts not on a line or rectangular grid: the
+    caller says what it does instead.
     """
     find_preconditioner(name)
     still = held(problem.Q)
@@ -88,8 +91,13 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
     def on_grid(act: Product, factor: float) -> Product:
         def apply(x: np.ndarray) -> np.ndarray:
             sorted_ = np.where(still, 0.0, x).reshape(problem.q.shape)[order]
+            if grid.turn is not None:
+                sorted_[:, 1:] = sorted_[:, 1:] @ grid.turn.T
+            made = act(sorted_.reshape(*grid.shape, problem.dim)).reshape(problem.q.shape)
+            if grid.turn is not None:
+                made[:, 1:] = made[:, 1:] @ grid.turn
             out = np.empty(problem.q.shape)
-            out[order] = act(sorted_.reshape(*grid.shape, problem.dim)).reshape(problem.q.shape)
+            out[order] = made
             return np.where(still, x, factor * out.ravel())  # what cannot move is on its own
 
         return apply
@@ -101,10 +109,14 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
     """(k dim, j <= dim^2): constant and linear functions of the place in every component: translations, tilts, stretches.
 
-    Components that cannot move stay at rest; what is then no motion of its own is left out.
+    On a closed line, which has no linear functions, the first cosine and sine take their place. Components that cannot move
+    stay at rest; what is then no motion of its own is left out.
     """
-    place = problem.chart.places
-    place = place - place.mean(axis=1, keepdims=True)
+    chart = problem.chart
+    place = chart.places - chart.places.mean(axis=1, keepdims=True)
+    if chart.period is not None:
+        angle = 2 * np.pi * chart.places[0] / chart.period
+        place = np.stack([np.cos(angle), np.sin(angle)])
     functions = [np.ones(problem.contacts), *(x / (np.abs(x).max() or 1.0) for x in place)]
     Z = np.concatenate([np.kron(f[:, None], np.eye(problem.dim)) for f in functions], axis=1)
     Z[held(problem.Q)] = 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.fft import irfft, rfft
+from scipy.fft import fft, ifft, irfft, rfft
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt.errors import InputError
@@ -12,12 +12,12 @@ from contactopt.solving.preconditioners.grid import Grid, Product
 INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
 
 
-def seminorm(m: int) -> np.ndarray:
+def seminorm(m: float) -> np.ndarray:
     """First column (2m,) of the sparse circulant matrix of the H^1/2 seminorm, eq (27); about log2 m entries.
 
     Its rows sum to zero where m is a power of two: constants are the kernel of a seminorm.
     """
-    column, top = np.zeros(2 * m), int(np.ceil(np.log2(m)))
+    column, top = np.zeros(round(2 * m)), int(np.ceil(np.log2(m)))
     column[0] = 2 * np.sum(1 / np.arange(1, 2**top) ** 2.0)
     for i in range(1, top + 1):
         j = 2**i - 1
@@ -26,15 +26,18 @@ def seminorm(m: int) -> np.ndarray:
     return column
 
 
-def norm(m: int, h: float) -> np.ndarray:
+def norm(m: float, h: float) -> np.ndarray:
     """First column (2m,) of the circulant matrix of the H^1 norm, eq (28)."""
-    column = np.zeros(2 * m)
+    column = np.zeros(round(2 * m))
     column[0], column[[1, -1]] = 2 / h + h, -1 / h
     return column
 
 
 def p21(grid: Grid) -> tuple[Product, None]:
     """Eq (25): E' Q_c E on a line; on a rectangle the sum of it along both directions, P31, eq (29)."""
+    if grid.closed:
+        symbol, smallest = closed_symbol(*grid.shape)
+        return circular(np.maximum(symbol, smallest / 2)), None
     lines = [restricted_circulant(rfft(seminorm(closed_curve(k))).real, k, axis) for axis, k in enumerate(grid.shape)]
     return lambda X: np.sum([line(X) for line in lines], axis=0), None
 
@@ -47,6 +50,10 @@ def p22(grid: Grid) -> tuple[Product, Product]:
     if len(grid.shape) > 1:
         raise InputError("preconditioner 'p22' is for contact lines (2D); in 3D choose p21 or neumann.")
     (k,) = grid.shape
+    if grid.closed:
+        symbol, smallest = closed_symbol(k)
+        symbol = np.maximum(symbol, smallest / 2) / fft(norm(k / 2, 4 / k)).real
+        return circular(1 / symbol), circular(symbol)
     m = closed_curve(k)
     symbol = rfft(seminorm(m)).real / rfft(norm(m, 4 / (k - 1))).real
     product, guess = restricted_circulant(symbol, k, 0), p21(grid)[0]
@@ -57,6 +64,21 @@ def p22(grid: Grid) -> tuple[Product, Product]:
         return np.stack([cg(toeplitz, x, rtol=INNER, maxiter=500, M=near)[0] for x in X.T], axis=1)
 
     return solve, product
+
+
+def closed_symbol(k: int) -> tuple[np.ndarray, float]:
+    """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, which needs no extension, and the least but zero.
+
+    Where k is no power of two the column of eq (27) does not sum to zero: what is left is taken off.
+    """
+    symbol = fft(seminorm(k / 2)).real
+    symbol = symbol - symbol[0]
+    return symbol, float(symbol[1:].min())
+
+
+def circular(symbol: np.ndarray) -> Product:
+    """Circulant matrix with that (real, symmetric) symbol (k,) along the first axis."""
+    return lambda X: np.asarray(ifft(symbol[:, None] * fft(X, axis=0), axis=0).real)
 
 
 def closed_curve(k: int) -> int:

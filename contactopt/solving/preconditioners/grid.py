@@ -1,4 +1,4 @@
-"""The grid of the contacts: a line or a rectangle of nodes that transforms work on."""
+"""The grid of the contacts: a line, a closed curve or a rectangle of nodes that transforms work on."""
 
 from __future__ import annotations
 
@@ -6,29 +6,33 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import nodal_weights
+from contactopt.solving.preconditioners.constants import CELL, EDGE
 
 Product = Callable[[np.ndarray], np.ndarray]  # acts on arrays (*shape, dim)
 EVEN = 1e-6  # relative difference of spacings that counts as none
-CELL = 0.45  # power of a node's cell that weights it on a surface: 1/2 where the spacing varies slowly
-EDGE = 0.2  # and of the share of the cell that an edge leaves: 0 for a half-space, 1/4 and more for a quarter-space
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Contacts on a line or a rectangular grid, in the order of C arrays of that shape.
+    """Contacts on a line, a closed curve or a rectangular grid, in the order of C arrays of that shape.
 
     ticks    places along each direction [length]
     held     (dim, directions, 2): component does not move at the first / last contact of that direction
     weights  (k,) square roots of what takes the nodes' sizes out of Q, see nodal_weights
+    closed   whether the line returns to its start
+    turn     (dim - 1, dim - 1) rotation from tangential components in the chart to those along the directions
     """
 
     ticks: tuple[np.ndarray, ...]
     held: np.ndarray
     weights: np.ndarray
+    closed: bool = False
+    turn: np.ndarray | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -38,9 +42,12 @@ class Grid:
 def grid_of(problem: InterfaceProblem, still: np.ndarray) -> tuple[Grid, np.ndarray]:
     """The grid of the contacts, and the order (k,) of the contacts in it; still (k, dim) masks what cannot move.
 
-    Raises InputError where there is none.
+    It is found in the chart, where the grid may be turned by any angle. Raises InputError where there is none.
     """
-    x = problem.chart.places
+    if problem.dim == 2:
+        return _line(problem, still)
+    turn = _turn(problem.chart.places)
+    x = turn @ problem.chart.places
     size = np.ptp(x, axis=1).max(initial=0.0)
     ticks, places = [], []
     for row in x:
@@ -55,18 +62,48 @@ def grid_of(problem: InterfaceProblem, still: np.ndarray) -> tuple[Grid, np.ndar
     full = min(shape) > 2 and np.prod(shape) == problem.contacts
     if not full or np.any(np.diff(np.ravel_multi_index(places, shape)[order]) != 1):
         raise InputError("the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a side.")
+    oblique = not np.array_equal(turn, np.eye(2))
+    if oblique and np.any(still[:, 1:].any(axis=1) & ~still[:, 1:].all(axis=1)):
+        raise InputError("a grid at an angle to tangential directions that are held has no preconditioner.")
     on_grid = still[order].reshape(*shape, problem.dim)
-    across = tuple(range(len(shape) - 1))
-    ends = [[on_grid.take(end, axis).all(axis=across) for end in (0, -1)] for axis in range(len(shape))]
+    ends = [[on_grid.take(end, axis).all(axis=0) for end in (0, -1)] for axis in range(2)]
     areas = problem.areas[order]
-    if len(shape) == 1:
-        weights = nodal_weights(x[:, order], areas, problem.dim)
-    else:
-        cells = np.multiply.outer(*(cells_along(t) for t in ticks)).ravel()
-        weights = cells**CELL * (areas * cells.sum() / areas.sum() / cells) ** EDGE
-    return Grid(tuple(ticks), np.moveaxis(np.array(ends), 2, 0), weights / np.sqrt(np.mean(weights**2))), order
+    cells = np.multiply.outer(*(cells_along(t) for t in ticks)).ravel()
+    weights = cells**CELL * (areas * cells.sum() / areas.sum() / cells) ** EDGE
+    weights /= np.sqrt(np.mean(weights**2))
+    return Grid(tuple(ticks), np.moveaxis(np.array(ends), 2, 0), weights, turn=turn if oblique else None), order
+
+
+def _line(problem: InterfaceProblem, still: np.ndarray) -> tuple[Grid, np.ndarray]:
+    """The contacts in their order along a contact line, or around a closed one."""
+    chart, order = problem.chart, problem.chart.order()
+    ticks = chart.places[0, order]
+    if len(ticks) < 3 or np.any(np.diff(ticks) <= 0):
+        raise InputError("the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a side.")
+    weights = nodal_weights(chart, problem.areas)[order]
+    held = still[order][[0, -1]].T[:, None, :] if not chart.closed else np.zeros((2, 1, 2), dtype=bool)
+    return Grid((ticks,), held, weights, chart.closed), order
+
+
+def _turn(places: np.ndarray) -> np.ndarray:
+    """Rotation (2, 2) that lays the directions to the nearest neighbours of places (2, k) along the axes.
+
+    On a rectangular grid they are those of its sides; their angles are known up to quarter turns, of which the least is
+    taken: the identity, to the last digit, where the grid is along the axes already.
+    """
+    points = places.T
+    if len(points) < 4:
+        return np.eye(2)
+    step = points[KDTree(points).query(points, k=2)[1][:, 1]] - points
+    # Directions that differ by a quarter turn have the same fourth power as complex numbers.
+    fourth = ((step[:, 0] + 1j * step[:, 1]) / np.maximum(np.linalg.norm(step, axis=1), 1e-300)) ** 4
+    angle = np.angle(np.mean(fourth)) / 4
+    if abs(angle) <= EVEN:
+        return np.eye(2)
+    return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 
 
 def cells_along(ticks: np.ndarray) -> np.ndarray:
+    """Length of the line that belongs to every tick: half-way to its neighbours, and as much beyond an end."""
     steps = np.diff(ticks)
     return np.concatenate([steps[:1], (steps[:-1] + steps[1:]) / 2, steps[-1:]])

@@ -1,9 +1,10 @@
-"""The grid of the contacts, and `neumann`: the square root of the Laplacian on it by cosine transforms.
+"""`neumann`: the square root of the Laplacian of the contacts, by cosine transforms.
 
-Free ends of a contact line or surface are even (a traction does not vanish there), ends where a plane of symmetry or an
-axis holds a component are odd: cosine and sine transforms. On a line the spacing does not matter: in terms of nodal
-forces the kernel of Q is log |x_i - x_j|, a function of the node numbers up to smooth terms. On a surface it is
-1 / |x_i - x_j|; uneven directions have their own eigenvectors there, a matrix as small as one side of the grid.
+A traction does not vanish at a free end of a contact line or surface: the Laplacian is even there. It is odd where a
+plane of symmetry or an axis holds a component. That makes cosine and sine transforms; a closed line has neither end, and
+takes the Fourier transform. On a line the spacing does not matter: in terms of nodal forces the kernel of Q is
+log |x_i - x_j|, a function of the node numbers up to smooth terms. On a surface the kernel is 1 / |x_i - x_j|, and a
+direction with uneven spacing has eigenvectors of its own: a matrix as small as one side of the grid.
 """
 
 from __future__ import annotations
@@ -13,12 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
-from scipy.fft import dct, dst, idct, idst
+from scipy.fft import dct, dst, fft, idct, idst
 
+from contactopt.solving.preconditioners.constants import SOFT, SPLIT
 from contactopt.solving.preconditioners.grid import EVEN, Grid, Product, cells_along
 
-SPLIT = 0.3  # Poisson's ratio of the model half-space
-SOFT = 0.28  # what bilinear elements add for the shortest waves; best on reports/preconditioners
 # held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j + shift) / k
 TRANSFORMS = {
     (False, False): (dct, idct, 2, 0.0),
@@ -41,8 +41,19 @@ class Direction:
     backward: Callable[[np.ndarray, int], np.ndarray]
 
 
+def closed_line(k: int) -> Direction:
+    """The Laplacian around a closed line of k evenly spaced nodes, by the Hartley transform, which is its own inverse."""
+
+    def hartley(x: np.ndarray, axis: int) -> np.ndarray:
+        spectrum = fft(x, axis=axis, norm="ortho")
+        return np.asarray(spectrum.real - spectrum.imag)
+
+    waves = 4 * np.sin(np.pi * np.arange(k) / k) ** 2
+    return Direction(waves, waves, hartley, hartley)
+
+
 def direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
-    """The Laplacian along `ticks`, odd at the ends that are held; on a line as if they were even."""
+    """The Laplacian along `ticks`, odd at the ends that are held; on a line as if they were evenly spaced."""
     to, back, kind, shift = TRANSFORMS[bool(held[0]), bool(held[1])]
     k, steps = len(ticks), np.diff(ticks)
     waves = 4 * np.sin(np.pi * (np.arange(k) + shift) / (2 * k)) ** 2
@@ -68,7 +79,8 @@ def direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
 def neumann(grid: Grid) -> tuple[Product, Product]:
     """Square root of the Laplacian of the contacts, weighted by their sizes, and its inverse.
 
-    Its zero, the constants, is half the smallest other value.
+    The Laplacian maps constants to zero, which has no inverse. Half the smallest other eigenvalue of the root stands in
+    its place.
     """
     parts = [_root(grid, component) for component in range(len(grid.held))]
     weight = grid.weights.reshape(grid.shape)
@@ -99,10 +111,13 @@ def _root(grid: Grid, component: int) -> tuple[np.ndarray, list[Direction]]:
     bilinear elements more so the shorter the wave.
     """
     held = grid.held[component]
-    directions = [direction(t, h, len(grid.ticks) == 1) for t, h in zip(grid.ticks, held)]
+    if grid.closed:
+        directions = [closed_line(*grid.shape)]
+    else:
+        directions = [direction(t, h, len(grid.ticks) == 1) for t, h in zip(grid.ticks, held)]
     waves = np.meshgrid(*(d.waves for d in directions), indexing="ij")
     squares = sum(np.meshgrid(*(d.squares for d in directions), indexing="ij"))
-    spacing = [np.ptp(t) / (len(t) - 1) for t in grid.ticks]
+    spacing = [1.0 if grid.closed else np.ptp(t) / (len(t) - 1) for t in grid.ticks]  # the mean is scaled out later
     total = np.maximum(sum(waves), 1e-300)
     if len(waves) == 2:
         (x, y), a = waves, spacing[1] / spacing[0]

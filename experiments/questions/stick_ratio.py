@@ -7,7 +7,8 @@ import time
 from matplotlib.figure import Figure
 
 from contactopt import Material, reduce, scenes, solve
-from contactopt.analysis.zone import stick_half_width
+from contactopt.analysis.edges import equivalent_half_width
+from contactopt.analysis.status import contact_status
 from contactopt.analytic import dundurs, stick_ratio
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
 from experiments.report import write
@@ -24,11 +25,13 @@ def measure(width: float, elements: int) -> dict[str, object]:
     start = time.perf_counter()
     problem = reduce(scene)
     solution = solve(problem)
+    sticking = contact_status(problem, solution.reactions).stick
+    ratio = equivalent_half_width(scene, float(problem.areas[sticking].sum())) / 20
     return {
         "foundation width / a": width / 20,
         "elements per a": elements,
-        "c / a": stick_half_width(scene, problem, solution.reactions) / 20,
-        "error": stick_half_width(scene, problem, solution.reactions) / 20 - EXACT,
+        "c / a": ratio,
+        "error": ratio - EXACT,
         "residual": solution.residual,
         "iterations": solution.iterations,
         "seconds": time.perf_counter() - start,

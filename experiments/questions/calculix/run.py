@@ -17,7 +17,7 @@ import skfem
 from contactopt import InterfaceProblem, Material, Scene, scenes, solve
 from contactopt.interface.recovery import recover
 from contactopt.interface.reduction import Reduction, reduce_bodies
-from experiments.calculix_deck import Contact, Model, deck, model
+from experiments.questions.calculix.deck import Contact, Model, deck, model
 
 ELEMENTS, MU = 32, 0.2
 STIFF = 5e5  # MPa: strain 1e-7, so that displaced surfaces are as good as undisplaced ones

@@ -1,6 +1,6 @@
 """The numbers of contactopt.interface.costs, measured: what an explicit and an implicit Q cost on growing punches.
 
-`python -m experiments.form_of_q [elements ...]` prints, for each mesh, the entries of the factors over the formula for them, the
+`python -m experiments.questions.form_of_q [elements ...]` prints, for each mesh, the entries of the factors over the formula for them, the
 products of a solve from cold, and the prices SOLVE and DENSE that the seconds of the phases imply.
 """
 

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import scenes
+from contactopt.analysis.solve_scene import Options
 from contactopt.analysis.zone import solve_zone
 from contactopt.figures.plots import BLUE, GREY, ORANGE
 from experiments.report import merged, write
@@ -22,7 +23,8 @@ SIZES = (32, 48, 64, 92)  # elements across the half-width of the punch
 def once(elements: int) -> dict[str, object]:
     """punch-3d, bodies by multigrid, from nested meshes; run in a process of its own."""
     wall, cpu = time.perf_counter(), time.process_time()
-    reduction, solution, _ = solve_zone(scenes.flat_punch(3, elements=elements), solver="multigrid")
+    solved = solve_zone(scenes.flat_punch(3, elements=elements), options=Options(solver="multigrid"))
+    reduction, solution = solved.reduction, solved.solution
     seconds = {"wall [s]": time.perf_counter() - wall, "CPU [s]": time.process_time() - cpu}
     phases = {f"{name} [s]": value for name, value in solution.seconds.items()}
     return {
@@ -40,7 +42,7 @@ def once(elements: int) -> dict[str, object]:
 
 
 def isolated(elements: int) -> dict[str, object]:
-    command = [sys.executable, "-m", "experiments.large_punch", "--once", str(elements)]
+    command = [sys.executable, "-m", "experiments.questions.large_punch", "--once", str(elements)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return dict(json.loads(done.stdout.splitlines()[-1]))
 

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import Material, Part, Rigid, Scene, Support, reduce_bodies, solve
-from contactopt.analysis.zone import contact_half_width
+from contactopt.analysis.edges import contact_edge
 from contactopt.analytic import contact_modulus, flat_punch_axisymmetric, hertz_point
 from contactopt.bodies import elements
 from contactopt.figures.plots import BLUE, GREY, ORANGE
@@ -99,7 +99,7 @@ def measure(case: str, n: int, degree: int, shape: str, **options: object) -> di
     size = np.sum(problem.areas * (exact.pressure(x) / exact.peak) ** 2)
     return row | {
         "peak": float(pressure.max() / exact.peak - 1),
-        "radius": float(contact_half_width(made, problem, solution.reactions) - 1) if dim == 2 else np.nan,
+        "radius": float(contact_edge(made, problem, solution.reactions) - 1) if dim == 2 else np.nan,
         "traction": float(np.sqrt(np.sum(problem.areas * error**2) / size)),
         "ripple": float(np.std(error[inner])),
     }

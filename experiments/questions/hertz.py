@@ -6,7 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import reduce, scenes, solve
-from contactopt.analysis.zone import contact_half_width, equivalent_half_width, pressed, solve_zone
+from contactopt.analysis.edges import contact_edge, equivalent_half_width
+from contactopt.analysis.status import contact_status
+from contactopt.analysis.zone import solve_zone
 from contactopt.figures.plots import BLUE, GREY, ORANGE
 from contactopt.scenes.scene import Scene
 from experiments.report import write
@@ -18,7 +20,8 @@ FORCES = (100.0, 30.0, 10.0, 3.0, 1.0)
 
 def default() -> list[dict[str, object]]:
     scene = scenes.sphere()
-    reduction, solution, zones = solve_zone(scene)
+    solved = solve_zone(scene)
+    reduction, solution, zones = solved.reduction, solved.solution, solved.zones
     problem, exact = reduction.problem, scene.reference
     pressure = solution.reactions[:, 0] / problem.areas
     smooth = solve(reduce(scenes.sphere(mu=0.0), zone=zones[-2]))
@@ -40,17 +43,18 @@ def default() -> list[dict[str, object]]:
 
 def errors(scene: Scene, elements: int) -> dict[str, object]:
     exact = scene.reference
-    reduction, solution, zones = solve_zone(scene, elements)
+    solved = solve_zone(scene, elements)
+    reduction, solution, zones = solved.reduction, solved.solution, solved.zones
     peak = (solution.reactions[:, 0] / reduction.problem.areas).max()
     fixed = reduce(scene, elements, zone=WIDE * exact.half_width)
     single = solve(fixed)
-    area = float(fixed.areas[pressed(single.reactions)].sum())
+    area = float(fixed.areas[contact_status(fixed, single.reactions).touching].sum())
     return {
         "elements": elements,
         "nodes": fixed.contacts,
         "rounds": len(zones) - 1,
         "radius, loop": zones[-1] / exact.half_width - 1,
-        "radius, no loop, extrapolated": contact_half_width(scene, fixed, single.reactions) / exact.half_width - 1,
+        "radius, no loop, extrapolated": contact_edge(scene, fixed, single.reactions) / exact.half_width - 1,
         "radius, no loop, nodes in contact": equivalent_half_width(scene, area) / exact.half_width - 1,
         "peak, loop": peak / exact.peak - 1,
         "peak, no loop": (single.reactions[:, 0] / fixed.areas).max() / exact.peak - 1,
@@ -60,7 +64,8 @@ def errors(scene: Scene, elements: int) -> dict[str, object]:
 def falling(force: float) -> dict[str, object]:
     scene = scenes.sphere(radius=200.0, foundation_radius=400.0, foundation_height=400.0, force=force, elements=64)
     exact = scene.reference
-    reduction, solution, zones = solve_zone(scene)
+    solved = solve_zone(scene)
+    reduction, solution, zones = solved.reduction, solved.solution, solved.zones
     return {
         "force [N]": force,
         "a / R": exact.half_width / 200,

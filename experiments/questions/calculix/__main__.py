@@ -20,8 +20,8 @@ import numpy as np  # noqa: E402
 from contactopt import solve  # noqa: E402
 from contactopt.interface.recovery import recover  # noqa: E402
 from contactopt.interface.reduction import reduce_bodies  # noqa: E402
-from experiments.calculix_deck import LEAST  # noqa: E402
-from experiments.calculix_run import (  # noqa: E402
+from experiments.questions.calculix.deck import LEAST  # noqa: E402
+from experiments.questions.calculix.run import (  # noqa: E402
     MU,
     RIGID,
     STIFF,
@@ -102,7 +102,7 @@ import sys
 from contactopt import solve
 from contactopt.interface.recovery import recover
 from contactopt.interface.reduction import reduce_bodies
-from experiments.calculix_run import peak_memory, punch
+from experiments.questions.calculix.run import peak_memory, punch
 reduction = reduce_bodies(punch(int(sys.argv[1])))
 recover(reduction, solve(reduction.problem))
 print(peak_memory())
@@ -112,7 +112,7 @@ print(peak_memory())
 def own_memory(elements: int) -> float:
     """Peak memory of a fresh process of contactopt, Python and its packages included [MB]."""
     arguments = [sys.executable, "-c", MEMORY, str(elements)]
-    folder = Path(__file__).parents[1]
+    folder = Path(__file__).parents[3]
     return float(subprocess.run(arguments, capture_output=True, text=True, check=True, cwd=folder).stdout)
 
 

@@ -1,0 +1,110 @@
+"""The one place that solves a scene: reduce it to its interface, find a start, solve.
+
+Whatever solves scenes is a loop around solve_scene(): contactopt.analysis.zone remeshes to the contact zone,
+contactopt.analysis.accuracy refines meshes around that.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from contactopt.analysis.constants import COARSEST, FACTOR, ROUGH
+from contactopt.interface.reduction import Reduction, reduce_bodies
+from contactopt.problem import Solution
+from contactopt.problem.operators import InterfaceOperator
+from contactopt.problem.transfer import transfer
+from contactopt.scenes.scene import Scene
+from contactopt.solving.driver import solve
+from contactopt.solving.methods import Method
+
+Note = Callable[[str], None]
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Options:
+    """How scenes are solved, whatever loop goes around it.
+
+    Attributes
+    ----------
+    Q : form of the interface operator, as for contactopt.reduce
+    solver : of the bodies' linear systems, as for contactopt.reduce
+    method : as for contactopt.solve
+    tol : bound on the natural-map residual
+    settings : further arguments of contactopt.solve: limits, and settings of a method that is given by its name
+    note : receives one short sentence before every step that takes time
+    """
+
+    Q: str = "auto"
+    solver: str = "auto"
+    method: str | Method | None = None
+    tol: float = 1e-8
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    note: Note = lambda text: None
+
+    @property
+    def of_solve(self) -> dict[str, Any]:
+        """The arguments of contactopt.solve."""
+        return {"method": self.method, "tol": self.tol} | dict(self.settings)
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A scene that was reduced and solved.
+
+    `solution.seconds` holds the wall time [s] of each phase, summed over all that led to this solution: `assemble`,
+    `factorise` and `compliance` of the bodies, `load` of further states of a path, `solve` of the interface problem by
+    the method, and `coarse` for everything that was done on coarser meshes.
+
+    zones  half-widths of the contact zone [length]: for which the first mesh was made, and read from each solution; none
+           if the scene has no zone
+    """
+
+    reduction: Reduction
+    solution: Solution
+    zones: tuple[float, ...] = ()
+
+
+def solve_scene(
+    scene: Scene,
+    elements: int | None = None,
+    zone: float | None = None,
+    options: Options | None = None,
+    start: Solved | None = None,
+) -> Solved:
+    """Reduce a scene on one mesh and solve it.
+
+    Parameters
+    ----------
+    scene : what to solve
+    elements : across the contact half-width; the scene's own number by default
+    zone : half-width of contact that the mesh resolves [length]; the scene's first guess by default
+    options : how to solve it
+    start : the same scene solved on another mesh, to start from. Without one, where Q is known by its products, the scene
+        is first solved on a coarser mesh, if its bodies can make one.
+
+    Raises
+    ------
+    InputError : on a scene that cannot be modelled, or options that do not fit
+    """
+    options = options or Options()
+    elements = scene.elements if elements is None else elements
+    options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
+    reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver)
+    seconds = Counter(reduction.seconds)
+    coarser = elements // (2 if reduction.iterative else FACTOR[scene.dim])
+    if start is None and isinstance(reduction.problem.Q, InterfaceOperator) and not scene.given and coarser >= COARSEST:
+        begin = time.perf_counter()
+        start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
+        seconds.update({"coarse": time.perf_counter() - begin})
+    options.note(f"solving {reduction.problem.contacts} contacts")
+    first = None if start is None else transfer(start.reduction.problem, start.solution, reduction.problem)
+    solution = solve(reduction.problem, start=first, **options.of_solve)
+    seconds.update(solution.seconds)
+    log.info("%s: %d elements, %s after %d iterations", scene.name, elements, solution.status, solution.iterations)
+    return Solved(reduction, replace(solution, seconds=dict(seconds)))

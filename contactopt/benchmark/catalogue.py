@@ -1,0 +1,104 @@
+"""What plug-ins declare: names, laws and arguments. Read in a process of its own, so that no plug-in runs in the campaign's.
+
+The campaign's process certifies the answers. A plug-in that changes the library where it is loaded changes nothing there.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from contactopt.benchmark.plugins import LAWS, find_plugin, load_plugins, plugin_problems
+from contactopt.benchmark.process import START, Ended, Process
+from contactopt.errors import InputError
+from contactopt.solving.methods import METHODS
+
+LIMIT = 120.0  # s to load all plug-ins
+LONGEST = 10e6  # bytes of a catalogue
+P = inspect.Parameter
+KINDS = (P.POSITIONAL_ONLY, P.POSITIONAL_OR_KEYWORD, P.VAR_POSITIONAL, P.KEYWORD_ONLY, P.VAR_KEYWORD)
+Arguments = tuple[tuple[str, int, bool], ...]  # (name, index in KINDS, whether it has a default)
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A plug-in method without its code: its law, whether it iterates, and its arguments."""
+
+    law: str
+    iterates: bool
+    arguments: Arguments
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(name for name, _, _ in self.arguments)
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """methods and problems that plug-ins declare, by name."""
+
+    methods: Mapping[str, Declared] = field(default_factory=dict)
+    problems: Mapping[str, Arguments] = field(default_factory=dict)
+
+
+def read_catalogue(paths: Sequence[str], names: Sequence[str]) -> Catalogue:
+    """What these plug-in files declare, and the entry points among these names of methods.
+
+    Raises InputError, naming the file, if one of them fails, hangs, or ends the process.
+    """
+    asked = [name for name in dict.fromkeys(names) if name not in METHODS]
+    if not paths and not asked:
+        return Catalogue()
+    process = Process("inspect")
+    try:
+        found = process.ask((tuple(paths), asked), {START: LIMIT}, LONGEST)
+    except Ended as end:
+        where = ", ".join(f"'{path}'" for path in paths) or "entry points"
+        raise InputError(f"plug-ins ({where}) could not be loaded: {end.status}, {end.message}.") from end
+    finally:
+        process.close()
+    if isinstance(found, dict) and "error" in found:
+        raise InputError(str(found["error"]))
+    try:
+        methods = {
+            str(name): Declared(LAWS[LAWS.index(law)], bool(iterates), _checked(arguments))
+            for name, (law, iterates, arguments) in found["methods"].items()
+        }
+        return Catalogue(methods, {str(name): _checked(arguments) for name, arguments in found["problems"].items()})
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        raise InputError("plug-ins declared something that cannot be read.") from error
+
+
+def _checked(arguments: Any) -> Arguments:
+    return tuple((str(name), KINDS.index(KINDS[kind]), bool(default)) for name, kind, default in arguments)
+
+
+def bind(arguments: Arguments, *values: Any, **given: Any) -> None:
+    """TypeError, as from the call itself, unless these values fit the arguments."""
+    parameters = [P(name, KINDS[kind], default=None if default else P.empty) for name, kind, default in arguments]
+    inspect.Signature(parameters).bind(*values, **given)
+
+
+def arguments_of(function: Callable[..., Any]) -> Arguments:
+    parameters = inspect.signature(function).parameters.values()
+    return tuple((p.name, KINDS.index(p.kind), p.default is not P.empty) for p in parameters)
+
+
+def declare(paths: Sequence[str], names: Sequence[str]) -> dict[str, Any]:
+    """Load plug-ins and list what they declare; runs in the process of its own. {"error": sentence} if one fails."""
+    try:
+        load_plugins(paths)
+        for name in names:
+            find_plugin(name)
+        from contactopt.benchmark import plugins
+
+        return {
+            "methods": {p.name: (p.law, p.iterates, arguments_of(p.make)) for p in plugins._methods.values()},
+            "problems": {name: arguments_of(make) for name, make in plugin_problems().items()},
+        }
+    except InputError as error:
+        return {"error": str(error)}
+    except (Exception, SystemExit) as error:
+        return {"error": f"a plug-in cannot be used: {type(error).__name__}: {error}"}

@@ -1,0 +1,34 @@
+"""Files of a campaign and of reports: written whole or not at all, and never outside the folder that the user gave."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from contactopt.checks import check_name
+from contactopt.errors import InputError
+
+
+def subfolder(parent: Path, name: str) -> Path:
+    """The folder parent/name. It need not exist.
+
+    Raises InputError if the name can lead out of `parent`, or if it is a symbolic link there: the folder behind a link
+    was not given by the user, so nothing is written or removed in it.
+    """
+    check_name("the name", name)
+    folder = parent / name
+    if folder.is_symlink():
+        raise InputError(
+            f"'{folder}' is a symbolic link, which is not followed; remove it or choose another directory."
+        )
+    return folder
+
+
+@contextmanager
+def told(place: Path, advice: str = "choose another directory") -> Iterator[None]:
+    """Turn an OSError within the block, as of a full disk, into one sentence with what to do."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"cannot write into '{place}': {error.strerror or error}; {advice}.") from error

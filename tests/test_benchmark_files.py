@@ -1,0 +1,78 @@
+"""Files of `contactopt run`: names, earlier files, interruptions, numbers that no machine holds."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from contactopt import InputError, Material, Part, Rigid, run, scenes
+from contactopt.cli import main
+from tests.conftest import block, two_blocks
+from tests.test_benchmark_faults import BAD_NAMES, one_line
+
+
+@pytest.mark.parametrize("name", BAD_NAMES)
+def test_bodies_have_names_that_can_be_files(name):
+    for make in (lambda: Part(name, block("plane-strain", 0, 1), Material(5.0, 0.3)), lambda: Rigid(name)):
+        with pytest.raises(InputError, match="name"):
+            make()
+
+
+def test_two_bodies_of_one_name():
+    from dataclasses import replace
+
+    scene = two_blocks("plane-strain")
+    with pytest.raises(InputError, match="both bodies are called"):
+        replace(scene, lower=replace(scene.lower, name="upper"))
+
+
+def test_a_folder_used_again_keeps_nothing_of_the_run_before(tmp_path):
+    """Files of the user's stay, also where their names look like those of a run; those of the earlier run go."""
+    out, fresh, mine = tmp_path / "out", tmp_path / "fresh", {"notes.txt", "mine.vtu"}
+    run(two_blocks("plane-strain"), out)
+    first = {file.name for file in out.iterdir()}
+    for name in mine:
+        (out / name).write_text("mine")
+    (out / "path.png").write_text("of a run with a load path")
+    run(scenes.flat_punch(2, elements=4), out)
+    run(scenes.flat_punch(2, elements=4), fresh)
+    last = {file.name for file in out.iterdir()}
+    assert last == {file.name for file in fresh.iterdir()} | mine and first - last
+    foreign = tmp_path / "foreign"
+    foreign.mkdir()
+    (foreign / "path.png").write_text("mine")
+    run(scenes.flat_punch(2, elements=4), foreign)
+    assert (foreign / "path.png").read_text() == "mine"
+
+
+def test_an_interrupted_run_leaves_nothing(tmp_path):
+    """Ctrl-C at several moments from the start on: exit code 130, one last line, and no file."""
+    for number, wait in enumerate((0.3, 1.0, 2.0)):
+        out = tmp_path / f"out{number}" / "below"
+        command = [sys.executable, "-m", "contactopt", "run", "punch-3d", "--elements", "12", "--out", str(out)]
+        heed = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
+        process = subprocess.Popen(
+            command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, preexec_fn=heed
+        )
+        time.sleep(wait)
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=60)[1]
+        if process.returncode != 0 and said:  # it may have been done
+            assert process.returncode == 130, said
+            one_line(said, "interrupted")
+            assert not os.path.exists(out.parent)
+
+
+def test_meshes_that_no_machine_holds_are_one_sentence(tmp_path, capsys):
+    assert main(["run", "punch-2d", "--elements", "1000000000", "--out", str(tmp_path / "out")]) == 2
+    one_line(capsys.readouterr().err, "elements")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_force_beyond_all_numbers_is_one_sentence(tmp_path, capsys):
+    assert main(["run", "punch-2d", "--force", "1e308", "--elements", "4", "--out", str(tmp_path / "out")]) == 2
+    one_line(capsys.readouterr().err, "1e+100")
+    assert not (tmp_path / "out").exists()
