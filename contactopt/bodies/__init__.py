@@ -16,7 +16,11 @@ from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 BODIES: dict[type, tuple[str, str, str]] = {
     Part: ("contactopt.bodies.elastic", "assemble_elastic", "finite elements with linear elasticity"),
     Rigid: ("contactopt.bodies.rigid", "assemble_rigid", "a rigid body"),
-    HalfSpace: ("contactopt.bodies.half_space", "assemble_half_space", "a half-space on a regular grid, without a mesh"),
+    HalfSpace: (
+        "contactopt.bodies.half_space",
+        "assemble_half_space",
+        "a half-space on a regular grid, without a mesh",
+    ),
 }
 
 

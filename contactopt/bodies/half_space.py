@@ -189,7 +189,7 @@ class HalfSpaceBody:
         return np.asarray(self.at_rest + self.motions @ multipliers + self._compliance_product(force))
 
     def energy(self, U: np.ndarray) -> float:
-        moved, force = np.split(U, 2)
+        force = U[self.unknowns :]
         return float(force @ self._compliance_product(np.concatenate([force, force]))[: self.unknowns]) / 2
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:

@@ -30,6 +30,8 @@ from contactopt.material import Material, lame
 # Number of cells from the loaded one from which on Gauss's rule with that many points a side is used, farthest last.
 GAUSS = ((12, 8), (64, 3))
 
+Antiderivative = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
 
 def half_space_influence(
     material: Material, spacing: tuple[float, float], offsets: tuple[np.ndarray, np.ndarray]

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contactopt.errors import InputError
 from contactopt.scenes.common import with_elements
 from contactopt.scenes.flat import flat_punch, rigid_punch
+from contactopt.scenes.half_spaces import cattaneo_half_space, hertz_half_space, rough, rough_sliding
 from contactopt.scenes.round import cylinder, growing_indentation, indentation, sphere
 from contactopt.scenes.scene import Scene
 from contactopt.scenes.sliding import cattaneo, shear_cycle
@@ -19,13 +20,17 @@ __all__ = [
     "PATHS",
     "SCENES",
     "cattaneo",
+    "cattaneo_half_space",
     "cylinder",
     "flat_punch",
     "growing_indentation",
+    "hertz_half_space",
     "indentation",
     "make_path",
     "make_scene",
     "rigid_punch",
+    "rough",
+    "rough_sliding",
     "shear_cycle",
     "sphere",
 ]
@@ -44,12 +49,16 @@ SCENES: dict[str, tuple[Callable[..., Scene], str]] = {
     "hertz-dissimilar": (indentation, "rigid sphere on a half-space, axisymmetric; path: growing force"),
     "cattaneo-2d": (lambda **changes: cattaneo(2, **changes), "two cylinders pressed and sheared; path: shear cycle"),
     "cattaneo-3d": (lambda **changes: cattaneo(3, **changes), "two spheres pressed and sheared; path: shear cycle"),
+    "hertz-half-space": (hertz_half_space, "rigid sphere on a half-space without a mesh, frictionless"),
+    "cattaneo-half-space": (cattaneo_half_space, "two spheres as half-spaces, pressed and sheared"),
+    "rough": (rough, "rigid rough surface on a half-space; path: shear to full sliding"),
 }
 # the scenes whose answer depends on how the load is applied: name -> function making the states in their order
 PATHS: dict[str, Callable[..., tuple[Scene, ...]]] = {
     "hertz-dissimilar": growing_indentation,
     "cattaneo-2d": lambda **changes: shear_cycle(2, **changes),
     "cattaneo-3d": lambda **changes: shear_cycle(3, **changes),
+    "rough": rough_sliding,
 }
 
 

@@ -110,6 +110,9 @@ class Rigid:
     force: Mapping[str, float] | None = None
     displacement: Mapping[str, float] | None = None
 
+    def __post_init__(self) -> None:
+        check_name("the body's name", self.name)
+
 
 @dataclass(frozen=True)
 class HalfSpace:
@@ -139,8 +142,11 @@ class HalfSpace:
     depth: float | None = None
 
     def __post_init__(self) -> None:
+        check_name("the body's name", self.name)
         if not isinstance(self.material, Material):
-            raise InputError(f"half-space '{self.name}': its material must be a Material(E, nu); got {self.material!r}.")
+            raise InputError(
+                f"half-space '{self.name}': its material must be a Material(E, nu); got {self.material!r}."
+            )
         if self.depth is not None:
             check_number(f"the depth of half-space '{self.name}'", self.depth, low=0.0)
 
@@ -149,7 +155,9 @@ class HalfSpace:
         given = self.points(elements, zone) if callable(self.points) else self.points
         rows = (given,) if np.ndim(given[0]) == 0 else tuple(given)
         if len(rows) != axes:
-            raise InputError(f"half-space '{self.name}': its points need {axes} rows of places, one per axis; got {len(rows)}.")
+            raise InputError(
+                f"half-space '{self.name}': its points need {axes} rows of places, one per axis; got {len(rows)}."
+            )
         made = tuple(real_array(f"the points of half-space '{self.name}'", row) for row in rows)
         for row in made:
             steps = np.diff(row)
@@ -158,9 +166,6 @@ class HalfSpace:
                     f"half-space '{self.name}': its points must be at least 4 growing numbers per axis, evenly spaced."
                 )
         return made
-
-    def __post_init__(self) -> None:
-        check_name("the body's name", self.name)
 
 
 @dataclass(frozen=True)
@@ -247,7 +252,9 @@ class Scene:
     def given(self) -> bool:
         """Whether the mesh of a body is given, not made for a number of elements."""
         meshes = [part.mesh for part in self.parts if isinstance(part, Part)]
-        return any(not callable(m) for m in (*meshes, *(part.points for part in self.parts if isinstance(part, HalfSpace))))
+        return any(
+            not callable(m) for m in (*meshes, *(part.points for part in self.parts if isinstance(part, HalfSpace)))
+        )
 
     def _check_part(self, part: Part | Rigid | HalfSpace) -> None:
         if not isinstance(part, Part):

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.convolution import Convolution, Kernel, backward, forward, odd_axes
+from contactopt.problem.convolution import Convolution, Kernel, backward, forward
 from contactopt.problem.laws import Law
 from contactopt.solving.deadline import check_time
 
@@ -75,7 +75,9 @@ class Level:
         kernel = self.kernel.coarse()
         V = np.stack([self._means(column) for column in np.moveaxis(self.V, 2, 0)] or [np.zeros((0, 0))], axis=-1)
         V = V if len(self.s) else np.zeros((len(self.components), int(np.prod(kernel.grid)), 0))
-        first = np.arange(np.prod(self.kernel.grid)).reshape(self.kernel.grid)[(slice(None, None, 2),) * len(kernel.grid)]
+        first = np.arange(np.prod(self.kernel.grid)).reshape(self.kernel.grid)[
+            (slice(None, None, 2),) * len(kernel.grid)
+        ]
         law = self.law.lumped(first.ravel(), 2 ** len(kernel.grid))
         return Level(kernel, self.components, self._means(self.q), V, self.s, law, 1 / float(kernel.diagonal.mean()))
 

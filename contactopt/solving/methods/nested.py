@@ -73,7 +73,13 @@ class Nested:
             last = at.residual
             point = point[0] + change[0], point[1] + change[1]
             at = finest.evaluate(*point)
-            logger.info("grid %s: %d closed, %d iterations, residual %.1e", finest.kernel.grid, len(at.closed), count, at.residual)
+            logger.info(
+                "grid %s: %d closed, %d iterations, residual %.1e",
+                finest.kernel.grid,
+                len(at.closed),
+                count,
+                at.residual,
+            )
 
 
 def first_guess(levels: list[Level], given: Point | None) -> Point:
