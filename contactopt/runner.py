@@ -24,11 +24,11 @@ from contactopt.interface.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.scenes import PATHS, make_path, make_scene
-from contactopt.scenes.scene import Scene
+from contactopt.scenes.scene import HalfSpace, Scene
 from contactopt.solving.methods import default_method, find_method
 
 # What a run writes beside summary.json and one VTU file per body.
-RUN_FILES = ("deformed.png", "pressure.png", "path.png", "interface.npz", "history.csv", "path.npz")
+RUN_FILES = ("deformed.png", "maps.png", "pressure.png", "path.png", "interface.npz", "history.csv", "path.npz")
 Note = Callable[[str], None]
 PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work")
 
@@ -222,8 +222,13 @@ def _seconds(seconds: dict[str, float], start: float) -> dict[str, Any]:
 def _draw(result: Result, folder: Path) -> None:
     from contactopt import plots
 
-    picture = plots.deformed(result.scene, result.problem, result.fields)
-    picture.figure.savefig(folder / "deformed.png", dpi=130)
+    if result.fields:
+        picture = plots.deformed(result.scene, result.problem, result.fields)
+        picture.figure.savefig(folder / "deformed.png", dpi=130)
+    if any(isinstance(part, HalfSpace) for part in result.scene.parts):
+        from contactopt.figures.maps import maps_figure
+
+        maps_figure(result.reduction, result.solution).savefig(folder / "maps.png", dpi=130)
     plots.contact_figure(result.scene, result.problem, result.solution).savefig(folder / "pressure.png", dpi=130)
     if result.path is not None:
         from contactopt.figures.animation import path_figure

@@ -94,7 +94,7 @@ def rough(
     seed: int = 0,
     material: Material = RUBBER,
     mu: float = 0.3,
-    pressure: float = 0.005,
+    pressure: float = 0.02,
     shift: float = 0.0,
     periodic: bool = True,
 ) -> Scene:
@@ -129,19 +129,16 @@ def rough(
 def rough_sliding(*, steps: int = 6, shift: float | None = None, **changes: object) -> tuple[Scene, ...]:
     """The rough surface of rough(): pressed, then displaced along x in equal steps up to `shift`.
 
-    By default the shift is three times the one under which a circle of the whole area would slide as one body: more than enough
-    for contacts that touch in many small spots.
+    By default the shift is 1.5 times the one at which contacts slip everywhere if the highest summit is flattened to the mean
+    height: tangential and normal displacements at full sliding are about as mu (2 - nu) to 2 (1 - nu) (Ciavarella 1998, Jaeger 1998).
     """
     check_count("steps", steps)
     first = rough(**changes)  # type: ignore[arg-type]
     upper, lower = first.upper, first.lower
     assert isinstance(upper, Rigid) and isinstance(lower, HalfSpace)
     if shift is None:
-        pressed = -float((upper.force or {})["z"])
-        ticks = lower.ticks(1, None, 2)[0]
-        size = (ticks[-1] - ticks[0]) / np.sqrt(np.pi)
-        mu = float(first.mu) if isinstance(first.mu, (int, float)) else 0.0
-        shift = 3 * mu * pressed / (8 * tangential_modulus(lower.material) * size)
+        nu, mu = lower.material.nu, float(np.max(first.mu)) if not callable(first.mu) else 0.0
+        shift = 1.5 * mu * (2 - nu) / (2 - 2 * nu) * float(np.mean(upper.gap))  # type: ignore[arg-type]
     at = np.linspace(0.0, shift, steps + 1)
     return tuple(replace(first, upper=replace(upper, displacement={"x": float(x)})) for x in at)
 

@@ -36,6 +36,7 @@ class Level:
 
     kernel  of Q;  components  (c of them) that are solved for
     q       (c, k);  V (c, k, p);  s (p,);  law  of the k contacts;  rho  step of the natural map
+    count   where products are counted, of the finest grid
     """
 
     kernel: Kernel
@@ -45,6 +46,7 @@ class Level:
     s: np.ndarray
     law: Law
     rho: float
+    count: list[int] | None = None
 
     @classmethod
     def of_problem(cls, problem: InterfaceProblem) -> Level:
@@ -64,6 +66,7 @@ class Level:
             problem.s,
             law,
             rho,
+            problem.Q.count,
         )
 
     @property
@@ -118,6 +121,8 @@ class Level:
     def product(self, r: np.ndarray, single: bool = False) -> np.ndarray:
         """Q r (c, k)."""
         check_time()
+        if self.count is not None:
+            self.count[0] += 1
         grid = self.kernel.grid
         return self.kernel.act(r.reshape(-1, *grid), self.components, self.components, single).reshape(r.shape)
 
