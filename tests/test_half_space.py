@@ -163,9 +163,9 @@ def test_coarse_kernel_lumps_contacts():
 @pytest.mark.parametrize("law", LAWS)
 def test_nested_grids_give_the_answer_of_the_dense_method(law):
     mu = 0.01 if law == "tresca" else 0.3
-    problem = contactopt.reduce(ball(26, law=law, mu=mu))
+    problem = contactopt.reduce(ball(26, law=law, mu=mu, shear=0.0 if law == "frictionless" else 0.4))
     nested = contactopt.solve(problem, "nested", tol=1e-9)
-    dense = contactopt.solve(problem.explicit(), "newton", tol=1e-9)
+    dense = contactopt.solve(problem.explicit(), tol=1e-9)
     assert nested.solved and dense.solved and nested.products > 0
     assert natural_map_residual(problem.explicit(), nested.reactions, nested.multipliers) < 1e-9
     np.testing.assert_allclose(nested.reactions, dense.reactions, atol=1e-6 * np.abs(dense.reactions).max())
@@ -181,14 +181,14 @@ def test_half_plane_is_hertz_line_contact(law):
     x = ticks(400, 6.0)
     scene = Scene(
         "line",
-        Rigid("cylinder", gap=lambda p: p[0] ** 2 / 40, force={"y": -30.0}),
+        Rigid("cylinder", gap=lambda p: p[0] ** 2 / 40, force={"y": -3.0}),
         HalfSpace("base", Material(5.0, 0.0) if law == "frictionless" else Material(5.0, 0.4999), x),
         0.3, thickness=10.0, law=law,
     )  # fmt: skip
     problem = contactopt.reduce(scene)
     r = contactopt.solve(problem).reactions
     modulus = 5.0 / (1 - scene.lower.material.nu ** 2)
-    exact = contactopt.analytic.hertz_line(3.0, 20.0, modulus)
+    exact = contactopt.analytic.hertz_line(0.3, 20.0, modulus)
     p = r[:, 0] / problem.areas
     assert p.max() == pytest.approx(exact.peak, rel=2e-3)
     assert np.abs(p - exact.pressure(x)).max() < 0.03 * exact.peak
@@ -223,8 +223,9 @@ def approach_error(n):
 
 
 def test_hertz_point_contact_converges():
-    errors = [approach_error(n) for n in (16, 64)]
-    assert errors[1] < 5e-4 and errors[1] < errors[0] / 8  # a factor of 16 is second order
+    sizes = np.array([8, 16, 32, 64])
+    errors = [approach_error(n) for n in sizes]
+    assert errors[-1] < 1e-4 and np.polyfit(np.log(sizes), np.log(errors), 1)[0] < -1.8  # second order in the mean
 
 
 def test_hertz_scene_below_the_surface():
@@ -280,7 +281,7 @@ def test_shear_cycle_loses_what_mindlin_says():
     for shear in [0.0, 25.0, -25.0, 25.0]:
         states.append(replace(scene, upper=replace(scene.upper, force={"x": shear, "z": -100.0})))
     path = contactopt.follow(states)
-    work, modulus = path.history["friction_work"], contactopt.analytic.contact_modulus(STEEL, STEEL)
+    work = path.history["friction_work"]
     assert path.solved and path.history["energy_error"].max() < 1e-10
     modulus = 5.0 / 2
     tangential = contactopt.analytic.tangential_modulus(Material(5.0, 0.0), Material(5.0, 0.0))
@@ -314,15 +315,15 @@ def test_prescribed_approach_is_the_total_force_turned_round():
 
 def test_half_space_meets_finite_elements():
     """A block of finite elements, thick and wide beside its contact, is nearly the half-space of the same points."""
-    from contactopt.scenes.meshes import graded, patch, rename, tensor_mesh
+    from contactopt.scenes.meshes import graded, rename, tensor_mesh
 
     x = np.linspace(-1.0, 1.0, 33)
     outer = graded(40.0, x[1] - x[0], 1.4)[1:]
     across = np.concatenate([-1 - outer[::-1], x, 1 + outer])
 
     def block(elements, zone):
-        mesh = tensor_mesh(across, -graded(40.0, x[1] - x[0], 1.3)[::-1])
-        return patch(rename(mesh, bottom="y-", top="y+"), "top", "contact", [1.0 + 1e-9])
+        mesh = rename(tensor_mesh(across, -graded(40.0, x[1] - x[0], 1.3)[::-1]), bottom="y-")
+        return mesh.with_boundaries({"contact": lambda p: (p[1] == 0) & (np.abs(p[0]) < 1)})
 
     lower = Part("block", block, STEEL, (Support("bottom"),))
     height = lambda p: -p[0] ** 2 / 8  # noqa: E731

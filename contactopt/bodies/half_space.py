@@ -2,9 +2,9 @@
 
 Each point stands for a cell of the surface that carries a uniform traction; its displacement is that of the middle of the cell
 (contactopt.bodies.influence). The unknowns are the displacements of the k points, component by component of each, followed by
-the forces that made them, which is what an elastic energy is computed from:
+the forces that made them and by the motion of the body as a whole, which are what energies are computed from:
 
-    U = (u_1 ... u_k, F_1 ... F_k),   energy = F'(u - rigid motion) / 2.
+    U = (u_1 ... u_k, F_1 ... F_k, motion),   elastic energy = F' C F / 2,   external force = -sum F on the motion.
 
 The body as a whole may be displaced by a given amount, be held, or move freely under a total force; displacements from
 deformation vanish far away (in the plane: at the reference depth; on a periodic surface: in the mean).
@@ -84,13 +84,14 @@ class HalfSpaceBody:
     @property
     def at_rest(self) -> np.ndarray:
         k = int(np.prod(self.grid))
-        return np.concatenate([np.tile(self._given, k), np.zeros(self.unknowns)])
+        return np.concatenate([np.tile(self._given, k), np.zeros(self.unknowns), self._given])
 
     @property
     def motions(self) -> np.ndarray:
         k, dim = int(np.prod(self.grid)), len(self.components)
         columns = [self.components.index(name) for name in self.part.force or {}]
-        return np.concatenate([np.tile(np.eye(dim)[:, columns], (k, 1)), np.zeros((self.unknowns, len(columns)))])
+        shifts = np.eye(dim)[:, columns]
+        return np.concatenate([np.tile(shifts, (k, 1)), np.zeros((self.unknowns, len(columns))), shifts])
 
     @property
     def resultants(self) -> np.ndarray:
@@ -99,7 +100,7 @@ class HalfSpaceBody:
     def surface(self, name: str | None = None) -> Surface:
         if name not in (None, "contact"):
             raise InputError(f"body '{self.name}' has one contact surface, 'contact'; there is no {name!r}.")
-        k, dim, n = int(np.prod(self.grid)), len(self.components), 2 * self.unknowns
+        k, dim, n = int(np.prod(self.grid)), len(self.components), len(self.at_rest)
         flat = np.stack([row.ravel() for row in np.meshgrid(*self.ticks, indexing="ij")])
         points = np.concatenate([flat, np.zeros((1, k))])
         places = np.concatenate([flat, self.outward * self._height(flat)[None]])
@@ -172,7 +173,7 @@ class HalfSpaceBody:
         turned = np.roll(force[:m].reshape(-1, dim), 1, axis=1).ravel()
         operator = Convolution(self.kernel, accuracy)
         moved = np.roll((operator @ turned).reshape(-1, dim), -1, axis=1).ravel()
-        return np.concatenate([moved, force[:m]])
+        return np.concatenate([moved, force[:m], np.zeros(dim)])
 
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
         k, dim = int(np.prod(self.grid)), len(self.components)
@@ -189,14 +190,13 @@ class HalfSpaceBody:
         return np.asarray(self.at_rest + self.motions @ multipliers + self._compliance_product(force))
 
     def energy(self, U: np.ndarray) -> float:
-        force = U[self.unknowns :]
-        return float(force @ self._compliance_product(np.concatenate([force, force]))[: self.unknowns]) / 2
+        force = U[self.unknowns : 2 * self.unknowns]
+        return float(force @ self._compliance_product(force)[: self.unknowns]) / 2
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """What keeps the body in equilibrium acts on it as a whole; it is shared out evenly over the points."""
-        k, dim = int(np.prod(self.grid)), len(self.components)
-        total = -U[self.unknowns :].reshape(k, dim).sum(axis=0)
-        return np.concatenate([np.tile(total / k, k), np.zeros(self.unknowns)])
+        """What keeps the body in equilibrium with the contact forces; it acts on the body as a whole."""
+        m, dim = self.unknowns, len(self.components)
+        return np.concatenate([np.zeros(2 * m), -U[m : 2 * m].reshape(-1, dim).sum(axis=0)])
 
     def fields(self, U: np.ndarray) -> None:
         return None

@@ -14,6 +14,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import ClassVar
 
 import numpy as np
@@ -23,14 +24,17 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import Law
 from contactopt.solving.kernels.levels import Evaluation, Level, Point, step
-from contactopt.solving.methods import NATIVE, Iterate
+from contactopt.solving.methods import NATIVE, Iterate, find_method
+from contactopt.solving.notes import note
 
 logger = logging.getLogger(__name__)
 
 LOOSEST, TIGHTEST = 0.1, 1e-4  # relative accuracy of a step: while contacts still open or close, and at last
 ROUGH = 3e-2  # residual at which a coarse grid has done its work, over the size of the forces
+SURE = 1e-4  # and the coarsest grid, from which the others must not be led astray
 NEAR = 1e-8  # and from which on iterates of the finest grid are shown to the driver
 STEPS = 30  # on a coarse grid
+TRIES = 80  # iterates of the default method there, where Newton's steps fail
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,7 @@ class Nested:
         while levels[-1].halves:
             levels.append(levels[-1].coarse())
         given = None if start is None else (start[0].T[list(levels[0].components)].copy(), start[1])
-        point = first_guess(levels, given)
+        point = robust_start(levels[-1], first_guess(levels, given)) if len(levels) > 1 else first_guess(levels, given)
         for coarse, fine in zip(levels[:0:-1], levels[-2::-1]):
             point, at = solve_level(coarse, point)
             logger.info("grid %s: residual %.1e", coarse.kernel.grid, at.residual)
@@ -100,11 +104,30 @@ def first_guess(levels: list[Level], given: Point | None) -> Point:
     return r, lam
 
 
-def solve_level(level: Level, point: Point) -> tuple[Point, Evaluation]:
+def robust_start(coarsest: Level, point: Point) -> Point:
+    """A solution on the coarsest grid: by Newton's steps, or where they go astray by the default method on an array Q."""
+    reached, at = solve_level(coarsest, point, SURE)
+    if at.residual <= SURE * float(np.linalg.norm(reached[0])) or len(coarsest.components) < coarsest.kernel.dim:
+        return reached
+    note(logger, "Newton's method failed on the coarsest grid, so the default method starts there from an array Q")
+    V = np.moveaxis(coarsest.V, 0, 1).reshape(coarsest.q.size, -1)
+    small = InterfaceProblem(coarsest.kernel.entries(), coarsest.q.T, coarsest.law, V=V, s=coarsest.s)
+    best = at.residual
+    for r, lam in islice(find_method("auto").iterate(small), TRIES):
+        candidate = np.ascontiguousarray(r.T), lam
+        residual = coarsest.evaluate(*candidate).residual
+        if residual < best:
+            reached, best = candidate, residual
+        if best <= SURE * float(np.linalg.norm(reached[0])):
+            break
+    return reached
+
+
+def solve_level(level: Level, point: Point, enough: float = ROUGH) -> tuple[Point, Evaluation]:
     """Newton's steps on a coarse grid, until the residual is small beside the forces."""
     at, last = level.evaluate(*point), np.inf
     for _ in range(STEPS):
-        if at.residual <= ROUGH * float(np.linalg.norm(point[0])):
+        if at.residual <= enough * float(np.linalg.norm(point[0])):
             break
         change, _ = step(level, at, worth(at.residual, last))
         last = at.residual
