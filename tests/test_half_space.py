@@ -1,5 +1,7 @@
 """Half-spaces: kernels against quadrature and equilibrium, solutions against exact ones, one answer by every road."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import dblquad, quad
@@ -70,9 +72,10 @@ def test_coefficients_of_strips(place):
     h, depth, nu, G = 0.5, 30.0, STEEL.nu, STEEL.E / 2.6
     made = half_plane_influence(STEEL, h, np.array([place]), depth)
     x = h * place
-    logs = quad(lambda s: np.log(abs(s)), x - h / 2, x, epsabs=1e-14)[0] + quad(
-        lambda s: np.log(abs(s)), x, x + h / 2, epsabs=1e-14
-    )[0]
+    logs = (
+        quad(lambda s: np.log(abs(s)), x - h / 2, x, epsabs=1e-14)[0]
+        + quad(lambda s: np.log(abs(s)), x, x + h / 2, epsabs=1e-14)[0]
+    )
     for pair, sign in (((0, 0), 1), ((1, 1), -1)):
         exact = (1 - nu) / (np.pi * G) * (np.log(depth) - logs / h + sign / (2 * (1 - nu)))
         assert made[pair][0] == pytest.approx(exact, rel=1e-10)
@@ -136,7 +139,9 @@ def test_operator_is_symmetric_positive_and_equal_to_its_entries(changes):
     np.testing.assert_allclose(np.diag(entries), Q.diagonal, rtol=1e-12)
     assert np.linalg.eigvalsh(entries).min() > -1e-13
     np.testing.assert_allclose(Q.loosened(1e-3) @ x, entries @ x, atol=1e-5)
-    by_bodies = sum(B @ body.displacement(B.T @ x, 0 * body.resultants) for B, body in zip(reduction.maps, reduction.bodies))
+    by_bodies = sum(
+        B @ body.displacement(B.T @ x, 0 * body.resultants) for B, body in zip(reduction.maps, reduction.bodies)
+    )
     np.testing.assert_allclose(by_bodies, entries @ x, atol=1e-12)
     np.testing.assert_allclose(contactopt.reduce(ball(16, **changes), Q="explicit").Q, entries, atol=1e-14)
 
@@ -187,7 +192,7 @@ def test_half_plane_is_hertz_line_contact(law):
     )  # fmt: skip
     problem = contactopt.reduce(scene)
     r = contactopt.solve(problem).reactions
-    modulus = 5.0 / (1 - scene.lower.material.nu ** 2)
+    modulus = 5.0 / (1 - scene.lower.material.nu**2)
     exact = contactopt.analytic.hertz_line(0.3, 20.0, modulus)
     p = r[:, 0] / problem.areas
     assert p.max() == pytest.approx(exact.peak, rel=2e-3)
@@ -246,8 +251,20 @@ def test_upper_half_space_mirrors_the_lower():
     """The same contact seen upside down: the rough body below, the half-space above."""
     points = (ticks(16), ticks(12, 7.5))
     gap = lambda p: (p[0] - 0.3) ** 2 / 20 + (p[1] + 0.5) ** 2 / 25  # noqa: E731
-    down = Scene("a", Rigid("r", gap=gap, force={"z": -2.0, "x": 0.2, "y": 0.1}), HalfSpace("h", STEEL, points), 0.3, kind="solid")
-    up = Scene("a", HalfSpace("h", STEEL, points, force={"z": -2.0, "x": -0.2, "y": -0.1}), Rigid("r", gap=gap), 0.3, kind="solid")
+    down = Scene(
+        "a",
+        Rigid("r", gap=gap, force={"z": -2.0, "x": 0.2, "y": 0.1}),
+        HalfSpace("h", STEEL, points),
+        0.3,
+        kind="solid",
+    )
+    up = Scene(
+        "a",
+        HalfSpace("h", STEEL, points, force={"z": -2.0, "x": -0.2, "y": -0.1}),
+        Rigid("r", gap=gap),
+        0.3,
+        kind="solid",
+    )
     first, second = (contactopt.solve(contactopt.reduce(s), tol=1e-10).reactions for s in (down, up))
     np.testing.assert_allclose(first[:, 0], second[:, 0], atol=1e-8)
     np.testing.assert_allclose(first[:, 1:], -second[:, 1:], atol=1e-8)
@@ -326,7 +343,7 @@ def test_half_space_meets_finite_elements():
         return mesh.with_boundaries({"contact": lambda p: (p[1] == 0) & (np.abs(p[0]) < 1)})
 
     lower = Part("block", block, STEEL, (Support("bottom"),))
-    height = lambda p: -p[0] ** 2 / 8  # noqa: E731
+    height = lambda p: -(p[0] ** 2) / 8  # noqa: E731
     pairs = [
         Scene("pair", HalfSpace("ball", STEEL, x, height=height, force={"y": -0.3}, depth=40.0), below, 0.3)
         for below in (lower, HalfSpace("flat", STEEL, x, depth=40.0))
@@ -377,7 +394,7 @@ def test_self_affine_surface():
     power = np.abs(np.fft.fft2(self_affine((256, 256), lengths, shortest=0.2, hurst=0.6, seed=1))) ** 2
     k = np.hypot(*np.meshgrid(*[np.fft.fftfreq(256, 1 / 256)] * 2, indexing="ij"))
     rings = np.geomspace(2, 48, 8)
-    mean = [power[(k >= low) & (k < high)].mean() for low, high in zip(rings, rings[1:])]
+    mean = [power[(k >= low) & (k < high)].mean() for low, high in pairwise(rings)]
     falling = np.polyfit(np.log(np.sqrt(rings[1:] * rings[:-1])), np.log(mean), 1)[0]
     assert falling == pytest.approx(-2 * (1 + 0.6), abs=0.25)
     assert power[(k > 51) | (k < 0.5)].max() < 1e-20 * power.max()
@@ -394,7 +411,12 @@ def test_surfaces_from_files(tmp_path):
     np.save(tmp_path / "holes.npy", np.where(heights > 20, np.nan, heights))
     np.save(tmp_path / "line.npy", heights[0])
     (tmp_path / "words.txt").write_text("one two\nthree four\n")
-    for name, message in (("holes.npy", "misses 9"), ("line.npy", "4 x 4"), ("words.txt", "no table"), ("b.npy", "no file")):
+    for name, message in (
+        ("holes.npy", "misses 9"),
+        ("line.npy", "4 x 4"),
+        ("words.txt", "no table"),
+        ("b.npy", "no file"),
+    ):
         with pytest.raises(InputError, match=message):
             read_surface(tmp_path / name)
 

@@ -61,7 +61,9 @@ def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceCon
     )
 
 
-def pressure_distribution(problem: InterfaceProblem, solution: Solution, bins: int = 50) -> tuple[np.ndarray, np.ndarray]:
+def pressure_distribution(
+    problem: InterfaceProblem, solution: Solution, bins: int = 50
+) -> tuple[np.ndarray, np.ndarray]:
     """Edges (bins + 1,) [stress] and densities (bins,) [1 / stress] of the pressure in contact: shares of the real contact area."""
     touching = contact_status(problem, solution.reactions).touching
     pressure = solution.reactions[touching, 0] / problem.areas[touching]
@@ -84,7 +86,9 @@ def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarr
     Q = block(problem.Q, rows)
     motions = np.tile(np.eye(problem.dim), (problem.contacts, 1))[rows]
     system = LinearOperator(Q.shape, matvec=lambda x: Q @ x, dtype=float)
-    forces = np.stack([cg(system, m, rtol=STIFFNESS, maxiter=10 * len(rows))[0] if m.any() else m for m in motions.T], axis=1)
+    forces = np.stack(
+        [cg(system, m, rtol=STIFFNESS, maxiter=10 * len(rows))[0] if m.any() else m for m in motions.T], axis=1
+    )
     return np.asarray(motions.T @ forces)
 
 

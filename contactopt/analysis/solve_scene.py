@@ -100,7 +100,9 @@ def solve_scene(
     seconds = Counter(reduction.seconds)
     coarser = elements // (2 if reduction.iterative else FACTOR[scene.dim])
     bodies = isinstance(reduction.problem.Q, InterfaceOperator) and not isinstance(reduction.problem.Q, Convolution)
-    if start is None and bodies and not scene.given and coarser >= COARSEST:  # half-spaces have coarse grids of their own
+    if (
+        start is None and bodies and not scene.given and coarser >= COARSEST
+    ):  # half-spaces have coarse grids of their own
         begin = time.perf_counter()
         start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
         seconds.update({"coarse": time.perf_counter() - begin})

@@ -42,7 +42,9 @@ def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]
         For a periodic surface and for depths that are too small.
     """
     if body.part.periodic:
-        raise InputError(f"half-space '{body.name}' is periodic; stresses below the surface are those of a single one only.")
+        raise InputError(
+            f"half-space '{body.name}' is periodic; stresses below the surface are those of a single one only."
+        )
     least = max(body.spacing) / 2
     for depth in depths:
         check_number("a depth below the surface", depth, low=least * (1 - 1e-9), closed=True)
@@ -74,7 +76,10 @@ def _coefficients(body: HalfSpaceBody, padded: tuple[int, ...], depth: float) ->
     out = _mean(body, offsets, depth, COARSE)
     near = [np.flatnonzero(np.abs(row) <= max(NEAR, 4 * depth / h)) for row, h in zip(offsets, body.spacing)]
     out[(slice(None), slice(None), *np.ix_(*near))] = _mean(
-        body, [row[some] for row, some in zip(offsets, near)], depth, FINE if depth < 2 * max(body.spacing) else 2 * COARSE
+        body,
+        [row[some] for row, some in zip(offsets, near)],
+        depth,
+        FINE if depth < 2 * max(body.spacing) else 2 * COARSE,
     )
     return out
 

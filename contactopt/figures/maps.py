@@ -27,7 +27,14 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
         traction, slip = (np.linalg.norm(maps[name], axis=-1) for name in ("traction", "slip"))
         panels.append(("traction", np.where(closed, traction, np.nan), f"tangential traction [{stress}]", "viridis"))
         panels.append(("slip", np.where(closed, slip, np.nan), f"tangential displacement [{length}]", "magma"))
-        panels.append(("status", np.where(closed, maps["status"], np.nan), "1 stick, 2 slip", ListedColormap(["#1f77b4", "#ff7f0e"])))
+        panels.append(
+            (
+                "status",
+                np.where(closed, maps["status"], np.nan),
+                "1 stick, 2 slip",
+                ListedColormap(["#1f77b4", "#ff7f0e"]),
+            )
+        )
     if maps["pressure"].ndim == 1:
         figure = Figure(figsize=(4.2 * len(panels), 3.4), layout="constrained")
         for (name, values, label, _), ax in zip(panels, figure.subplots(1, len(panels))):

@@ -73,7 +73,11 @@ def cattaneo_half_space(
     return Scene(
         "cattaneo-half-space",
         HalfSpace(
-            "sphere", material, points, height=lambda x: -np.sum(x**2, axis=0) / (2 * radius), force={"x": shear, "z": -force}
+            "sphere",
+            material,
+            points,
+            height=lambda x: -np.sum(x**2, axis=0) / (2 * radius),
+            force={"x": shear, "z": -force},
         ),
         HalfSpace("flat", material, points),
         mu,
@@ -110,9 +114,7 @@ def rough(
     check_positive(length=length, pressure=pressure)
     check_number("shift", shift)
     shortest = length / 16 if shortest is None else shortest
-    heights = self_affine(
-        (points, points), (length, length), hurst=hurst, shortest=shortest, slope=slope, seed=seed
-    )
+    heights = self_affine((points, points), (length, length), hurst=hurst, shortest=shortest, slope=slope, seed=seed)
     ticks = (np.arange(points) + 0.5) * (length / points) - length / 2
     force = -pressure * length**2
     return Scene(

@@ -11,7 +11,9 @@ import numpy as np
 from contactopt.checks import check_count, check_number, check_positive, real_array
 from contactopt.errors import InputError
 
-INSTRUMENTS = "sur, x3p, vk4, vk6, vk7, plu, plux, al3d, opd, nms, sdf, gwy, os3d, zmg, zon, mnt"  # what surfalize reads
+INSTRUMENTS = (
+    "sur, x3p, vk4, vk6, vk7, plu, plux, al3d, opd, nms, sdf, gwy, os3d, zmg, zon, mnt"  # what surfalize reads
+)
 
 
 def self_affine(
