@@ -60,7 +60,7 @@ def test_coefficients_are_integrals_of_point_forces(place):
             assert abs(made[pair][0, 0]) < 1e-15  # odd
             continue
         total = sum(
-            dblquad(lambda s, r: value(r, s), *((a - hx / 2, a) if left else (a, a + hx / 2)),
+            dblquad(lambda s, r, value=value: value(r, s), *((a - hx / 2, a) if left else (a, a + hx / 2)),
                     *((b - hy / 2, b) if low else (b, b + hy / 2)), epsabs=1e-13, epsrel=1e-12)[0]
             for left in (True, False) for low in (True, False) for a, b in [(x, y)]
         )  # fmt: skip
@@ -96,7 +96,7 @@ def test_flamants_reference_point_is_johnsons():
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
 def test_point_force_stresses_are_in_equilibrium_and_compatible(nu):
     """Divergence zero, Beltrami and Michell's equations, and the force through a plane below is the force applied."""
-    place, h, I = np.array([0.7, -0.4, 0.9]), 2e-3, np.eye(3)
+    place, h, unit = np.array([0.7, -0.4, 0.9]), 2e-3, np.eye(3)
 
     def tensor(p):
         values = boussinesq_cerruti(np.array(p[0]), np.array(p[1]), p[2], nu)
@@ -106,10 +106,10 @@ def test_point_force_stresses_are_in_equilibrium_and_compatible(nu):
         return T
 
     def second(i, j, f):
-        e, d = h * I[i], h * I[j]
+        e, d = h * unit[i], h * unit[j]
         return (f(place + e + d) - f(place + e - d) - f(place - e + d) + f(place - e - d)) / (4 * h**2)
 
-    divergence = sum((tensor(place + h * I[i])[i] - tensor(place - h * I[i])[i]) / (2 * h) for i in range(3))
+    divergence = sum((tensor(place + h * unit[i])[i] - tensor(place - h * unit[i])[i]) / (2 * h) for i in range(3))
     assert np.abs(divergence).max() < 1e-4 * np.abs(tensor(place)).max()
     laplacian = sum(second(i, i, tensor) for i in range(3))
     for i in range(3):
@@ -119,7 +119,7 @@ def test_point_force_stresses_are_in_equilibrium_and_compatible(nu):
     grid = np.linspace(-200, 200, 1601)
     T = boussinesq_cerruti(*np.meshgrid(grid, grid, indexing="ij"), 2.0, nu)
     through = T[[4, 5, 2]].sum(axis=(2, 3)) * (grid[1] - grid[0]) ** 2
-    np.testing.assert_allclose(through, -I, atol=0.03)
+    np.testing.assert_allclose(through, -unit, atol=0.03)
 
 
 def test_line_force_stresses_balance_the_force():

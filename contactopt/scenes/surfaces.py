@@ -70,7 +70,7 @@ def self_affine(
             f"the wavelengths must grow from two spacings ({2 * spacing:g}) to shortest, roll_off and longest; got "
             f"{shortest:g}, {roll_off:g} and {longest:g}."
         )
-    reach = [int(math.floor(size / shortest * (1 + 1e-12))) for size in lengths]
+    reach = [math.floor(size / shortest * (1 + 1e-12)) for size in lengths]
     if any(2 * m >= n for m, n in zip(reach, points)):
         raise InputError(f"the shortest wavelength ({shortest:g}) must be longer than two spacings ({2 * spacing:g}).")
     orders = np.meshgrid(*[np.arange(-m, m + 1) for m in reach], indexing="ij")
