@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from contactopt.runner import Result, run
     from contactopt.scenes.contact import Contact
     from contactopt.scenes.mesh_files import load_mesh
-    from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
+    from contactopt.scenes.scene import BodyForce, HalfSpace, Part, Plate, Rigid, Scene, Support, Traction
     from contactopt.solving.driver import solve
 
 # name -> the module that it stands in
@@ -46,7 +46,7 @@ _HOMES = {
     "material": ("Material",),
     "scenes.contact": ("Contact",),
     "scenes.mesh_files": ("load_mesh",),
-    "scenes.scene": ("BodyForce", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
+    "scenes.scene": ("BodyForce", "HalfSpace", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
     "solving.driver": ("solve",),
 }
 _MODULES = {

@@ -26,14 +26,14 @@ from contactopt.interface.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution, alone, part_of
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.scenes import PATHS, make_path, make_scene
-from contactopt.scenes.scene import Scene
+from contactopt.scenes.scene import HalfSpace, Scene
 from contactopt.solving.methods import default_method, find_method
 
 if TYPE_CHECKING:
     from contactopt.scenes.scene_files import SceneFile
 
 # What a run writes beside summary.json and one VTU file per body.
-RUN_FILES = ("deformed.png", "pressure.png", "path.png", "interface.npz", "history.csv", "path.npz")
+RUN_FILES = ("deformed.png", "maps.png", "pressure.png", "path.png", "interface.npz", "history.csv", "path.npz")
 Note = Callable[[str], None]
 PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work")
 
@@ -279,8 +279,13 @@ def _draw(result: Result, folder: Path) -> None:
     from contactopt import plots
 
     problem, solution = result.problem, result.solution
-    picture = plots.deformed(result.scene, part_of(problem, problem.pairs[0]), result.fields)
-    picture.figure.savefig(folder / "deformed.png", dpi=130)
+    if result.fields:
+        picture = plots.deformed(result.scene, part_of(problem, problem.pairs[0]), result.fields)
+        picture.figure.savefig(folder / "deformed.png", dpi=130)
+    if any(isinstance(part, HalfSpace) for part in result.scene.parts):
+        from contactopt.figures.maps import maps_figure
+
+        maps_figure(result.reduction, result.solution).savefig(folder / "maps.png", dpi=130)
     for pair in problem.pairs:
         name = "pressure" if len(problem.pairs) == 1 else f"pressure-{pair.name}"
         plots.contact_figure(result.scene, *alone(problem, solution, pair)).savefig(folder / f"{name}.png", dpi=130)

@@ -16,6 +16,7 @@ from typing import Any
 from contactopt.analysis.constants import COARSEST, FACTOR, ROUGH
 from contactopt.interface.reduction import Reduction, reduce_bodies
 from contactopt.problem import Solution
+from contactopt.problem.convolution import Convolution
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.problem.transfer import transfer
 from contactopt.scenes.scene import Scene
@@ -98,7 +99,10 @@ def solve_scene(
     reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver)
     seconds = Counter(reduction.seconds)
     coarser = elements // (2 if reduction.iterative else FACTOR[scene.dim])
-    if start is None and isinstance(reduction.problem.Q, InterfaceOperator) and not scene.given and coarser >= COARSEST:
+    bodies = isinstance(reduction.problem.Q, InterfaceOperator) and not isinstance(reduction.problem.Q, Convolution)
+    if (
+        start is None and bodies and not scene.given and coarser >= COARSEST
+    ):  # half-spaces have coarse grids of their own
         begin = time.perf_counter()
         start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
         seconds.update({"coarse": time.perf_counter() - begin})

@@ -10,12 +10,17 @@ from typing import Any
 
 from contactopt.bodies.protocol import AssembledBody
 from contactopt.errors import InputError
-from contactopt.scenes.scene import Part, Rigid, Scene
+from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 
 # class of the part of a scene -> (module, function (scene, part, elements, zone) -> AssembledBody, what it is)
 BODIES: dict[type, tuple[str, str, str]] = {
     Part: ("contactopt.bodies.elastic", "assemble_elastic", "finite elements with linear elasticity"),
     Rigid: ("contactopt.bodies.rigid", "assemble_rigid", "a rigid body"),
+    HalfSpace: (
+        "contactopt.bodies.half_space",
+        "assemble_half_space",
+        "a half-space on a regular grid, without a mesh",
+    ),
 }
 
 

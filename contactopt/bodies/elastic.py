@@ -120,6 +120,9 @@ class ElasticBody:
 
         return product
 
+    def convolution(self, T: sp.csr_matrix) -> None:
+        return None
+
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
         local, (left, right) = T[:, self.interface], self._low_rank(T)
         C, added = local @ (local @ self.interface_compliance).T, left @ right.T

@@ -2,7 +2,7 @@
 
 A body comes in two stages. An AssembledBody knows its contact surface and its size, so that bodies can be coupled and
 mistakes be reported before any expensive work. Its `prepare` makes the Body, which moves under contact forces. Finite
-elements (contactopt.bodies.elastic) and rigid bodies (contactopt.bodies.rigid) are the present kinds; the table BODIES
+elements (contactopt.bodies.elastic), rigid bodies (contactopt.bodies.rigid) and half-spaces (contactopt.bodies.half_space) are the present kinds; the table BODIES
 of contactopt.bodies says which kind models which part of a scene.
 
 Every body has n displacement unknowns U. Under nodal forces F (n,) of the contact and multipliers lambda (p,) it moves by
@@ -24,6 +24,8 @@ import scipy.sparse as sp
 
 if TYPE_CHECKING:
     from contactopt.bodies.fields import Fields
+    from contactopt.problem.chart import Chart
+    from contactopt.problem.convolution import Kernel
 
 # (X (rows, j), relative accuracy or None for the best there is) -> T C T' X (rows, j)
 Product = Callable[[np.ndarray, float | None], np.ndarray]
@@ -70,6 +72,7 @@ class Surface:
     held      (dim, k) whether that component of the contact's displacement is prescribed
     cells     (v, c) contacts at the corners of the c linear cells that cover the surface
     mesh      the finite elements behind it; None for a body that has none
+    chart     places of the contacts on the surface, where the body knows them and its normals are all the same
     """
 
     body: str
@@ -82,6 +85,7 @@ class Surface:
     held: np.ndarray
     cells: np.ndarray
     mesh: Mesh | None = None
+    chart: Chart | None = None
 
 
 class AssembledBody(Protocol):
@@ -164,6 +168,9 @@ class Body(Protocol):
 
     def product(self, T: sp.csr_matrix) -> Product:
         """Products with T C T', for a sparse map T (rows, n) of the contact unknowns; what they need is prepared once."""
+
+    def convolution(self, T: sp.csr_matrix) -> Kernel | None:
+        """T C T' as a convolution over a grid of the contacts, if it is one; None if not."""
 
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
         """T C T' (rows, rows) as an array, symmetric to the last digit [length / force]."""

@@ -1,7 +1,8 @@
 """A rigid body: its compliance is zero, and its displacement unknowns are its motions.
 
 It has one unknown for each component of a translation. Those with a total force are free motions, whose displacements are
-multipliers of the interface problem; the others are held at zero.
+multipliers of the interface problem; the others are given, by default zero. The total contact force follows them in U, so that the
+forces that hold the body are known from U.
 """
 
 from __future__ import annotations
@@ -33,12 +34,14 @@ class RigidBody:
 
     @property
     def at_rest(self) -> np.ndarray:
-        return np.zeros(len(self.components))
+        values = self.part.displacement or {}
+        given = [float(values.get(name, 0.0)) for name in self.components]
+        return np.array([*given, *(0.0 for _ in given)])
 
     @property
     def motions(self) -> np.ndarray:
         columns = [self.components.index(name) for name in self._force]
-        return np.eye(len(self.components))[:, columns]
+        return np.eye(2 * len(self.components))[:, columns]
 
     @property
     def motion_names(self) -> tuple[str, ...]:
@@ -61,7 +64,7 @@ class RigidBody:
             own = np.array(self.part.normal, dtype=float)
             normals = np.tile(own[:, None] / np.linalg.norm(own), k)
         fixed = np.array([name not in self._force for name in self.components])
-        trace = [sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, dim)) for c in range(dim)]
+        trace = [sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, 2 * dim)) for c in range(dim)]
         held = np.tile(fixed[:, None], k)
         surface = Surface(
             self.name, other.points, normals, other.areas, other.weights, other.places, tuple(trace), held, other.cells
@@ -72,7 +75,8 @@ class RigidBody:
         """The initial gap at the contacts from that at the nodes, with the weights of the displacements."""
         if self.part.gap is None:
             return np.zeros(other.points.shape[1])
-        gap = np.asarray(self.part.gap(other.places), dtype=float)
+        given = self.part.gap(other.places) if callable(self.part.gap) else self.part.gap
+        gap = np.asarray(given, dtype=float).ravel()
         if gap.shape != other.places.shape[1:] or not np.all(np.isfinite(gap)):
             raise InputError(f"the gap of rigid body '{self.name}' must give one finite number per contact node.")
         return np.asarray(other.weights @ gap)
@@ -86,6 +90,9 @@ class RigidBody:
     def product(self, T: sp.csr_matrix) -> Product:
         return lambda X, accuracy: np.zeros(X.shape)
 
+    def convolution(self, T: sp.csr_matrix) -> None:
+        return None
+
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
         return np.zeros((T.shape[0], T.shape[0]))
 
@@ -93,14 +100,15 @@ class RigidBody:
         return np.zeros(T.shape[0], dtype=bool)
 
     def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        return np.asarray(self.motions @ multipliers)
+        return np.asarray(self.at_rest + self.motions @ multipliers + np.roll(force, len(self.components)))
 
     def energy(self, U: np.ndarray) -> float:
         return 0.0
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """The total forces. What holds the other components does no work and is left out."""
-        return np.asarray(self.motions @ self.resultants)
+        """The forces that keep the body in equilibrium with the contact forces."""
+        dim = len(self.components)
+        return np.concatenate([-U[dim:], np.zeros(dim)])
 
     def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Nothing: what holds a rigid body is what its contacts ask for."""

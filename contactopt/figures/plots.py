@@ -13,6 +13,7 @@ from contactopt.interface.recovery import Fields
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.scenes.scene import Scene
 
+ARROWS = 1000  # about as many arrows as a map of tractions can show
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
 
 
@@ -151,8 +152,8 @@ def contact_line(problem: InterfaceProblem) -> np.ndarray:
     x = problem.chart.places
     row = np.ones(x.shape[1], dtype=bool)
     if problem.dim == 3:
-        nearest = np.abs(x[1]).min()
-        row = np.abs(np.abs(x[1]) - nearest) <= 1e-6 * (1e-300 + np.ptp(x[1]))
+        nearest = x[1, np.argmin(np.abs(x[1]))]
+        row = np.abs(x[1] - nearest) <= 1e-6 * (1e-300 + np.ptp(x[1]))
     chosen = np.flatnonzero(row)
     return np.asarray(chosen[np.argsort(x[0, chosen])])
 
@@ -230,7 +231,9 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
             ax.scatter(x[mask], y[mask], s=14, marker=marker, color=colour, label=label, **face)
     t = solution.reactions[:, 1:] / problem.areas[:, None]
     if np.any(t):
-        ax.quiver(x, y, t[:, 0], t[:, 1], color="black", width=0.003)
+        shown = np.flatnonzero(status.touching)
+        shown = shown[:: max(1, len(shown) // ARROWS)]
+        ax.quiver(x[shown], y[shown], t[shown, 0], t[shown, 1], color="black", width=0.003)
     ax.set(
         xlabel=f"x [{scene.units[0]}]",
         ylabel=f"y [{scene.units[0]}]",

@@ -126,6 +126,8 @@ def renumbered(cells: np.ndarray, order: np.ndarray) -> np.ndarray:
 def local_map(surface: Surface, contacts: np.ndarray, frames: np.ndarray) -> sp.csr_matrix:
     """T (k dim, n): the body's unknowns -> the displacement of some of its contacts (k,) in the frames (k, dim, dim)."""
     k, dim = frames.shape[:2]
+    if all(trace.nnz == trace.shape[0] and np.all(np.diff(trace.indptr) == 1) for trace in surface.traces):
+        return _from_single_unknowns(surface, contacts, frames)
     rows, columns = np.arange(k * dim), np.repeat(np.arange(k), dim)
     parts = [
         sp.csr_matrix((frames[:, :, c].ravel(), (rows, columns)), (k * dim, k)) @ trace[contacts]
@@ -133,4 +135,23 @@ def local_map(surface: Surface, contacts: np.ndarray, frames: np.ndarray) -> sp.
     ]
     T = sp.csr_matrix(sum(parts[1:], parts[0]))
     T.eliminate_zeros()
+    return T
+
+
+def _from_single_unknowns(surface: Surface, contacts: np.ndarray, frames: np.ndarray) -> sp.csr_matrix:
+    """local_map of a surface on which every component of a contact is one unknown of the body, times a number."""
+    k, dim = frames.shape[:2]
+    unknowns = np.stack([trace.indices[contacts] for trace in surface.traces], axis=1)  # (k, dim)
+    values = np.stack([trace.data[contacts] for trace in surface.traces], axis=1)
+    if frames.strides[0] == 0:  # one frame for all, which usually swaps axes and no more
+        rows, columns = np.nonzero(frames[0])
+        count = np.append(0, np.cumsum(np.tile(np.bincount(rows, minlength=dim), k)))
+        data, indices = (values[:, columns] * frames[0][rows, columns]).ravel(), unknowns[:, columns].ravel()
+    else:
+        used = frames != 0
+        count = np.append(0, np.cumsum(np.count_nonzero(used, axis=2).ravel()))
+        data = (frames * values[:, None, :])[used]
+        indices = np.broadcast_to(unknowns[:, None, :], frames.shape)[used]
+    T = sp.csr_matrix((data, indices, count), (k * dim, surface.traces[0].shape[1]))
+    T.sort_indices()
     return T

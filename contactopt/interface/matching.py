@@ -9,6 +9,7 @@ from contactopt.bodies.protocol import AssembledBody, Surface
 from contactopt.errors import InputError
 from contactopt.interface.charts import ContactPoints, lay_out, normals_in_planes, symmetry_planes
 from contactopt.interface.coupling import Coupling, local_map, renumbered
+from contactopt.problem.chart import Chart
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
@@ -63,11 +64,21 @@ def couple_nodes(scene: Scene, pair: Contact, upper: AssembledBody, lower: Assem
     carrier = "lower" if lower.meshed else "upper"
     held = first.held[:, partner] & second.held
     points = ContactPoints(lead.points, normals, lead.areas, lead.cells, held, gap)
-    chart, frames, order = lay_out(points, scene.copies, scene.kind == "axisymmetric")
+    chart, frames, order = _laid_out(scene, lead, points)
     upper_map, lower_map = local_map(first, partner[order], frames), local_map(second, order, frames)
     cells = renumbered(lead.cells, order)
     areas, places, planes = lead.areas[order], lead.points[:, order], tuple(symmetry_planes(points))
     return Coupling(upper_map, lower_map, frames, gap[order], areas, places, chart, cells, planes, "matching", carrier)
+
+
+def _laid_out(scene: Scene, lead: Surface, points: ContactPoints) -> tuple[Chart, np.ndarray, np.ndarray]:
+    """Chart, frames and order of the contacts: those of a surface that knows its coordinates, or else laid out."""
+    known, normals = lead.chart, points.normals
+    if known is not None and np.all(np.abs(normals) == np.abs(lead.normals)) and np.all(normals == normals[:, :1]):
+        frame = np.roll(np.eye(len(normals)), 1, axis=0)  # n, t1 and t2 along the last, first and second component
+        frame[0] = normals[:, 0]
+        return known, np.broadcast_to(frame, (len(points.gap), *frame.shape)), np.arange(len(points.gap))
+    return lay_out(points, scene.copies, scene.kind == "axisymmetric")
 
 
 def match(upper: Surface, lower: Surface) -> np.ndarray:
@@ -87,6 +98,8 @@ def match(upper: Surface, lower: Surface) -> np.ndarray:
             f"interface nodes do not match: body '{upper.body}' has {upper.points.shape[1]} contact nodes, "
             f"body '{lower.body}' has {k}; give both meshes the same nodes there."
         )
+    if np.array_equal(upper.points, lower.points):
+        return np.arange(k)
     spacing = float(KDTree(lower.points.T).query(lower.points.T, k=2)[0][:, 1].min()) if k > 1 else 1.0
     mean = lower.normals @ lower.areas
     mean = mean / max(float(np.linalg.norm(mean)), 1e-300)

@@ -31,6 +31,7 @@ from contactopt.errors import InputError
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
 from contactopt.interface.coupling import Coupling, couple
 from contactopt.problem import InterfaceProblem, Law, Pair
+from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
 from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, dense, estimate_diagonal, nodal_weights
@@ -295,7 +296,11 @@ def _rows(B: sp.csr_matrix) -> np.ndarray:
 def _operator(
     bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
 ) -> InterfaceOperator:
-    """Q by its products. Its diagonal is an estimate, which takes one product."""
+    """Q by its products: a convolution where every body has one. Else its diagonal is an estimate, which takes one product."""
+    kernels = [body.convolution(B) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    if kernels and all(kernel is not None for kernel in kernels):
+        known = [kernel for kernel in kernels if kernel is not None]
+        return Convolution(sum(known[1:], known[0]))
     moved = [body.moved(B) for body, B in zip(bodies, maps)]
     moving = [(body, B, _rows(B)) for body, B, moves in zip(bodies, maps, moved) if moves.any()]
     terms = [(body.product(B[rows]), rows, body.parallel) for body, B, rows in moving]

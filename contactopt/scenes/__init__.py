@@ -16,6 +16,7 @@ from contactopt.scenes.scene import Scene
 if TYPE_CHECKING:
     from contactopt.scenes.assemblies import arch, pin_in_bush, press_fit, stack
     from contactopt.scenes.flat import flat_punch, rigid_punch
+    from contactopt.scenes.half_spaces import cattaneo_half_space, hertz_half_space, rough, rough_sliding
     from contactopt.scenes.round import cylinder, growing_indentation, indentation, sphere
     from contactopt.scenes.sliding import cattaneo, shear_cycle
 
@@ -34,6 +35,13 @@ SCENES: dict[str, tuple[Any, ...]] = {
     "hertz-dissimilar": ("round", "indentation", "rigid sphere on a half-space, axisymmetric; path: growing force"),
     "cattaneo-2d": ("sliding", "cattaneo", "two cylinders pressed and sheared; path: shear cycle", {"dim": 2}),
     "cattaneo-3d": ("sliding", "cattaneo", "two spheres pressed and sheared; path: shear cycle", {"dim": 3}),
+    "hertz-half-space": (
+        "half_spaces",
+        "hertz_half_space",
+        "rigid sphere on a half-space without a mesh, frictionless",
+    ),
+    "cattaneo-half-space": ("half_spaces", "cattaneo_half_space", "two spheres as half-spaces, pressed and sheared"),
+    "rough": ("half_spaces", "rough", "rigid rough surface on a half-space; path: shear to full sliding"),
 }
 # the scenes whose answer depends on how the load is applied: name -> (module, function that makes the states in their
 # order[, arguments that the name fixes])
@@ -41,6 +49,7 @@ PATHS: dict[str, tuple[Any, ...]] = {
     "hertz-dissimilar": ("round", "growing_indentation"),
     "cattaneo-2d": ("sliding", "shear_cycle", {"dim": 2}),
     "cattaneo-3d": ("sliding", "shear_cycle", {"dim": 3}),
+    "rough": ("half_spaces", "rough_sliding"),
 }
 _MODULES = {entry[1]: entry[0] for entry in (*SCENES.values(), *PATHS.values())}
 
@@ -49,15 +58,19 @@ __all__ = [
     "SCENES",
     "arch",
     "cattaneo",
+    "cattaneo_half_space",
     "cylinder",
     "flat_punch",
     "growing_indentation",
+    "hertz_half_space",
     "indentation",
     "make_path",
     "make_scene",
     "pin_in_bush",
     "press_fit",
     "rigid_punch",
+    "rough",
+    "rough_sliding",
     "shear_cycle",
     "sphere",
     "stack",

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.checks import check_name, check_number, short
+from contactopt.checks import check_name, check_number, real_array, short
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.scenes.contact import Contact
@@ -122,17 +122,73 @@ class Rigid:
 
     normal the contact normal, one value per component; None: the normals of the other body's contact boundary
     gap    function of the other body's contact nodes, coordinates (dim, k) -> initial gap (k,) along the normal
-           [length]; None means touching everywhere.
+           [length]; an array of these values, for half-spaces also of the shape of their grid; None means touching everywhere.
     force  None for an obstacle that does not move; otherwise, as in Plate, the total force on it by component.
+    displacement  of the body by component [length]; components that have neither a force nor a displacement are held.
     """
 
     name: str
     normal: tuple[float, ...] | None = None
-    gap: Callable[[np.ndarray], np.ndarray] | None = None
+    gap: Callable[[np.ndarray], np.ndarray] | np.ndarray | None = None
     force: Mapping[str, float] | None = None
+    displacement: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
         check_name("the body's name", self.name)
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """An elastic half-space (half-plane in 2D) without a mesh: what a body is that is large beside its contact.
+
+    The upper body fills the half z >= 0, the lower the half z <= 0 (in 2D: y). It has no support: it deforms under the contact
+    forces alone, and as a whole it is held, displaced or pressed by a total force.
+
+    points        places of the contact points along each direction of the surface, evenly spaced: (x,) in 2D, (x, y) in 3D
+                  [length]; or a function (elements, zone) -> such places. Each point stands for a cell about it
+    height        of the surface above its plane, outwards: function of the points (dim - 1, k) -> (k,), or an array of the shape
+                  of the grid, indexed [x, y] [length]; None: flat
+    force         the total force on the body by component, as in Rigid
+    displacement  of the body as a whole by component [length]; components that have neither a force nor a displacement are held
+    periodic      whether surface and forces repeat themselves beyond the points. Displacements are then measured from their mean
+    depth         in 2D, where displacements grow without end: how far beneath each force the point lies from which the
+                  displacements that it makes are measured [length]; by default ten times the length of the points
+    """
+
+    name: str
+    material: Material
+    points: Any
+    height: Callable[[np.ndarray], np.ndarray] | np.ndarray | None = None
+    force: Mapping[str, float] | None = None
+    displacement: Mapping[str, float] | None = None
+    periodic: bool = False
+    depth: float | None = None
+
+    def __post_init__(self) -> None:
+        check_name("the body's name", self.name)
+        if not isinstance(self.material, Material):
+            raise InputError(
+                f"half-space '{self.name}': its material must be a Material(E, nu); got {self.material!r}."
+            )
+        if self.depth is not None:
+            check_number(f"the depth of half-space '{self.name}'", self.depth, low=0.0)
+
+    def ticks(self, elements: int, zone: float | None, axes: int) -> tuple[np.ndarray, ...]:
+        """Places along each of the axes; InputError unless they are evenly spaced and growing."""
+        given = self.points(elements, zone) if callable(self.points) else self.points
+        rows = (given,) if np.ndim(given[0]) == 0 else tuple(given)
+        if len(rows) != axes:
+            raise InputError(
+                f"half-space '{self.name}': its points need {axes} rows of places, one per axis; got {len(rows)}."
+            )
+        made = tuple(real_array(f"the points of half-space '{self.name}'", row) for row in rows)
+        for row in made:
+            steps = np.diff(row)
+            if row.ndim != 1 or len(row) < 4 or steps.min() <= 0 or np.ptp(steps) > 1e-6 * steps.mean():
+                raise InputError(
+                    f"half-space '{self.name}': its points must be at least 4 growing numbers per axis, evenly spaced."
+                )
+        return made
 
 
 @dataclass(frozen=True)
@@ -159,8 +215,8 @@ class Scene:
     """
 
     name: str
-    upper: Part | Rigid | None = None
-    lower: Part | Rigid | None = None
+    upper: Part | Rigid | HalfSpace | None = None
+    lower: Part | Rigid | HalfSpace | None = None
     mu: float | np.ndarray | Callable[[np.ndarray], Any] | None = None
     kind: str = "plane-strain"
     thickness: float = 1.0
@@ -171,7 +227,7 @@ class Scene:
     zone: float | None = None
     units: tuple[str, str] = ("length", "stress")
     reference: Any = field(default=None, compare=False)
-    bodies: tuple[Part | Rigid, ...] = ()
+    bodies: tuple[Part | Rigid | HalfSpace, ...] = ()
     contacts: tuple[Contact, ...] = ()
 
     def __post_init__(self) -> None:
@@ -205,7 +261,7 @@ class Scene:
         return "; ".join(dict.fromkeys(pair.friction for pair in self.pairs))
 
     @property
-    def parts(self) -> tuple[Part | Rigid, ...]:
+    def parts(self) -> tuple[Part | Rigid | HalfSpace, ...]:
         """The bodies; in the short form the upper one first."""
         if self.upper is None or self.lower is None:
             return self.bodies
@@ -245,7 +301,10 @@ class Scene:
     @property
     def given(self) -> bool:
         """Whether the mesh of a body is given, not made for a number of elements."""
-        return any(isinstance(part, Part) and not callable(part.mesh) for part in self.parts)
+        meshes = [part.mesh for part in self.parts if isinstance(part, Part)]
+        return any(
+            not callable(m) for m in (*meshes, *(part.points for part in self.parts if isinstance(part, HalfSpace)))
+        )
 
     def _check_form(self) -> None:
         """Either the short form is given in full or the long one."""
@@ -295,9 +354,16 @@ class Scene:
             if not any(name in pair.bodies for pair in pairs):
                 raise InputError(f"scene '{self.name}': body '{name}' belongs to no contact; drop it or give it one.")
 
-    def _check_part(self, part: Part | Rigid) -> None:
+    def _check_part(self, part: Part | Rigid | HalfSpace) -> None:
+        if not isinstance(part, Part):
+            force, displacement = part.force or {}, part.displacement or {}
+            self._check_components(part.name, force)
+            self._check_components(part.name, displacement)
+            if set(force) & set(displacement):
+                raise InputError(f"body '{part.name}': a component can have a force or a displacement, not both.")
+        if isinstance(part, HalfSpace):
+            return
         if isinstance(part, Rigid):
-            self._check_components(part.name, part.force or {})
             if part.normal is not None:
                 if len(part.normal) != self.dim or not np.any(part.normal):
                     raise InputError(f"rigid body '{part.name}': its normal needs {self.dim} values, not all zero.")

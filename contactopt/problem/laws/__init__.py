@@ -123,6 +123,10 @@ class Law:
         """The map P of Newton's equations r = P(r - rho u), and its generalised derivative, at y (k, dim)."""
         return self.nearest_derivative(y, y[:, 0])
 
+    def idle(self, y: np.ndarray) -> np.ndarray:
+        """(k,) mask of points y (k, dim) at which `project` and its derivative are sure to be zero."""
+        return np.zeros(len(y), dtype=bool)
+
     def opening(self, u_t: np.ndarray) -> np.ndarray:
         """g (k,) [length]: what is added to the gap where contacts slip by u_t (k, dim - 1)."""
         return np.zeros(len(u_t))
@@ -166,6 +170,10 @@ class Law:
     def select(self, contacts: np.ndarray) -> Law:
         """The law of some contacts alone: indices, with repetitions if wanted, or a mask."""
         return self._mapped(lambda parameter: parameter[contacts])
+
+    def lumped(self, first: np.ndarray, count: int) -> Law:
+        """The law of groups of `count` contacts that act as one, of which `first` are the first ones."""
+        return self.select(first)
 
     def spread(self, k: int) -> Self:
         """The law of k contacts: numbers become arrays (k,). InputError on arrays of another length."""

@@ -24,6 +24,9 @@ class Coulomb(Law):
     def coefficient(self) -> np.ndarray:
         return self.mu
 
+    def idle(self, y: np.ndarray) -> np.ndarray:
+        return np.asarray(y[:, 0] <= 0)
+
     def bound(self, r_n: np.ndarray) -> np.ndarray:
         return np.asarray(self.mu * np.maximum(r_n, 0.0))
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.problem.cones import cylinder_derivative
 from contactopt.problem.laws import Law, Projected
 
 
@@ -27,11 +26,21 @@ class Frictionless(Law):
         if np.any(self.mu):
             raise InputError("contact without friction has mu = 0; for another value use the law 'coulomb'.")
 
+    def idle(self, y: np.ndarray) -> np.ndarray:
+        return np.asarray(y[:, 0] <= 0)
+
     def bound(self, r_n: np.ndarray) -> np.ndarray:
         return np.zeros(len(r_n))
 
     def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
-        return cylinder_derivative(y, np.zeros(len(y)))
+        D = np.zeros((*y.shape, y.shape[1]))
+        D[:, 0, 0] = y[:, 0] > 0
+        return self.nearest(y, r_n), D
+
+    def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
+        out = np.zeros(y.shape)
+        out[:, 0] = np.maximum(y[:, 0], 0.0)
+        return out
 
     @classmethod
     def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Frictionless:

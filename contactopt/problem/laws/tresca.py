@@ -37,6 +37,9 @@ class Tresca(Law):
     def scaled(self, force: float) -> Tresca:
         return replace(self, limit=self.limit / force)
 
+    def lumped(self, first: np.ndarray, count: int) -> Tresca:
+        return replace(self, limit=count * self.limit[first])
+
     @classmethod
     def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Tresca:
         return cls(values * areas)

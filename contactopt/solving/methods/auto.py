@@ -1,5 +1,6 @@
 """The default, without a number to choose: Newton's method, and where it fails cones, then the proximal loop.
 
+0. Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no force at all) while its residual
    falls. Elastic bodies end here (reports/newton_steps), each step one dense linear system.
 2. The interior-point method (contactopt.solving.kernels.interior), which no cycle and no rank deficiency of Q disturbs,
@@ -27,12 +28,14 @@ import scipy.sparse as sp
 
 from contactopt.errors import BackendError, InputError
 from contactopt.problem import InterfaceProblem, infeasibility
+from contactopt.problem.convolution import Convolution
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations, definite
 from contactopt.solving.kernels.interior import interior_iterates
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.solving.methods import NATIVE, Iterate
 from contactopt.solving.methods.cone import AcaryCadoux
+from contactopt.solving.methods.nested import Nested
 from contactopt.solving.methods.newton import Newton
 from contactopt.solving.methods.proximal import Proximal, proximal_equations, proximal_iterates
 from contactopt.solving.notes import note
@@ -72,6 +75,9 @@ class Auto:
         if sp.issparse(problem.Q) and not (problem.symmetric and definite(problem.Q)):
             reached = start or (np.zeros(problem.q.shape), np.zeros(len(problem.s)))
         else:
+            if isinstance(problem.Q, Convolution):
+                start = yield from self._nested(problem, start)
+                note(logger, "Newton's method on nested grids made no progress; it goes on with the finest grid alone")
             reached = yield from self._newton(problem, start, self.preconditioner)
             note(logger, "Newton's method made no progress, so interior points and the proximal loop take over")
             try:
@@ -101,6 +107,19 @@ class Auto:
             r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
             reached = problem.law.nearest(r, r[:, 0]), last[1]
             note(logger, "the proximal loop got nowhere and started again from random forces")
+
+    @staticmethod
+    def _nested(problem: InterfaceProblem, start: Iterate | None) -> Generator[Iterate, None, Iterate | None]:
+        """Iterates of the nested method while they change for the better; returns the best."""
+        best, reached, since = np.inf, start, 0
+        for point, residual in Nested().steps(problem, start):
+            yield point
+            since = 0 if residual < PROGRESS * best else since + 1
+            if residual < best:
+                best, reached = residual, point
+            if since >= PATIENCE:
+                break
+        return reached
 
     @staticmethod
     def _newton(

@@ -1,0 +1,275 @@
+"""An elastic half-space or half-plane that is loaded on a regular grid of points: no mesh, products by fast Fourier transforms.
+
+Each point stands for a cell of the surface that carries a uniform traction; its displacement is that of the middle of the cell
+(contactopt.bodies.influence). The unknowns are the displacements of the k points, component by component of each, followed by
+the forces that made them and by the motion of the body as a whole, which are what energies are computed from:
+
+    U = (u_1 ... u_k, F_1 ... F_k, motion),   elastic energy = F' C F / 2,   external force = -sum F on the motion.
+
+The body as a whole may be displaced by a given amount, be held, or move freely under a total force; displacements from
+deformation vanish far away (in the plane: at the reference depth; on a periodic surface: in the mean).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.bodies.influence import half_plane_influence, half_space_influence
+from contactopt.bodies.protocol import Product, Surface
+from contactopt.errors import InputError
+from contactopt.material import lame
+from contactopt.problem.chart import Chart
+from contactopt.problem.convolution import Convolution, Kernel, embedding
+from contactopt.scenes.scene import HalfSpace, Scene
+
+
+@dataclass(frozen=True, eq=False)
+class HalfSpaceBody:
+    """A half-space of a scene; it needs no preparation, so it is both stages of contactopt.bodies.protocol.
+
+    part        as the scene gives it;  components  of displacements, the normal of the surface last
+    ticks       places of the points along each axis of the grid [length]
+    outward     1 if the outward normal points along the last component, -1 if against it
+    thickness   of a half-plane [length]
+    """
+
+    part: HalfSpace
+    components: tuple[str, ...]
+    ticks: tuple[np.ndarray, ...]
+    outward: float
+    thickness: float
+
+    meshed = complete = True
+    iterative = parallel = False
+
+    @property
+    def name(self) -> str:
+        return self.part.name
+
+    @property
+    def grid(self) -> tuple[int, ...]:
+        return tuple(len(row) for row in self.ticks)
+
+    @property
+    def spacing(self) -> tuple[float, ...]:
+        return tuple(float(row[-1] - row[0]) / (len(row) - 1) for row in self.ticks)
+
+    @property
+    def unknowns(self) -> int:
+        return int(np.prod(self.grid)) * len(self.components)
+
+    interface_unknowns = unknowns
+
+    @property
+    def cell(self) -> float:
+        """Area of a cell [length^2]."""
+        return float(np.prod(self.spacing)) * self.thickness
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        """The compliance as a convolution, in components n, t1[, t2] with n along the last component and t1 along the first."""
+        make = _periodic if self.part.periodic else _infinite
+        grid_kernel = make(self)
+        return grid_kernel.scaled(1 / self.thickness) if len(self.grid) == 1 else grid_kernel
+
+    @property
+    def _given(self) -> np.ndarray:
+        values = self.part.displacement or {}
+        return np.array([float(values.get(name, 0.0)) for name in self.components])
+
+    @property
+    def at_rest(self) -> np.ndarray:
+        k = int(np.prod(self.grid))
+        return np.concatenate([np.tile(self._given, k), np.zeros(self.unknowns), self._given])
+
+    @property
+    def motions(self) -> np.ndarray:
+        k, dim = int(np.prod(self.grid)), len(self.components)
+        columns = [self.components.index(name) for name in self.part.force or {}]
+        shifts = np.eye(dim)[:, columns]
+        return np.concatenate([np.tile(shifts, (k, 1)), np.zeros((self.unknowns, len(columns))), shifts])
+
+    @property
+    def motion_names(self) -> tuple[str, ...]:
+        return tuple(f"translation along {name}" for name in self.part.force or {})
+
+    @property
+    def resultants(self) -> np.ndarray:
+        return np.array(list((self.part.force or {}).values()), dtype=float)
+
+    def surface(self, name: str | None = None) -> Surface:
+        if name not in (None, "contact"):
+            raise InputError(f"body '{self.name}' has one contact surface, 'contact'; there is no {name!r}.")
+        k, dim, n = int(np.prod(self.grid)), len(self.components), len(self.at_rest)
+        flat = np.stack([row.ravel() for row in np.meshgrid(*self.ticks, indexing="ij")])
+        points = np.concatenate([flat, np.zeros((1, k))])
+        places = np.concatenate([flat, self.outward * self._height(flat)[None]])
+        normals = np.zeros((dim, k))
+        normals[-1] = self.outward
+        count = np.arange(k + 1)
+        traces = tuple(
+            sp.csr_matrix((np.ones(k), (np.arange(k) * dim + c).astype(np.int32), count), (k, n)) for c in range(dim)
+        )
+        middle = flat - (flat.max(axis=1) + flat.min(axis=1))[:, None] / 2
+        return Surface(
+            self.name, points, normals, np.full(k, self.cell), sp.identity(k, format="csr"), places, traces,
+            np.zeros((dim, k), dtype=bool), self._cells(), chart=Chart(middle, (False,) * (dim - 1)),
+        )  # fmt: skip
+
+    def _height(self, flat: np.ndarray) -> np.ndarray:
+        height = self.part.height
+        if height is None:
+            return np.zeros(flat.shape[1])
+        made = np.asarray(height(flat) if callable(height) else height, dtype=float)
+        if made.shape not in (self.grid, flat.shape[1:]) or not np.all(np.isfinite(made)):
+            raise InputError(
+                f"the height of half-space '{self.name}' must give one finite number per point, shape {self.grid}; "
+                f"got shape {made.shape}."
+            )
+        return made.ravel()
+
+    def _cells(self) -> np.ndarray:
+        number = np.arange(np.prod(self.grid), dtype=np.int32).reshape(self.grid)
+        if number.ndim == 1:
+            return np.stack([number[:-1], number[1:]])
+        corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+        return np.stack([corner.ravel() for corner in corners])
+
+    def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
+        raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
+
+    def iterates(self, solver: str) -> bool:
+        """Its products are so cheap that an array of its compliance never pays."""
+        return True
+
+    def prepare(self, solver: str, entries: bool) -> HalfSpaceBody:
+        return self
+
+    def convolution(self, T: sp.csr_matrix) -> Kernel | None:
+        """T C T' as a convolution, for maps to displacements of all points in their order in components +-n, +-t1[, +-t2]."""
+        k, dim = int(np.prod(self.grid)), len(self.components)
+        own = np.roll(np.arange(dim), 1)  # n is the last component
+        if T.shape[0] != k * dim or T.nnz != k * dim or np.any(np.diff(T.indptr) != 1):
+            return None
+        if np.any(T.indices.reshape(k, dim) != dim * np.arange(k)[:, None] + own):
+            return None
+        signs = T.data.reshape(k, dim)
+        if np.any(signs != signs[0]) or not np.allclose(np.abs(signs[0]), 1.0, rtol=1e-12):
+            return None
+        symbols = {(a, b): signs[0, a] * signs[0, b] * symbol for (a, b), symbol in self.kernel.symbols.items()}
+        return replace(self.kernel, symbols=symbols)
+
+    def product(self, T: sp.csr_matrix) -> Product:
+        back, act = T.T.tocsr(), self._compliance_product
+
+        def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
+            return np.asarray(T @ np.stack([act(force, accuracy) for force in (back @ X).T], axis=1))
+
+        return product
+
+    def _compliance_product(self, force: np.ndarray, accuracy: float | None = None) -> np.ndarray:
+        """C F (n,) for nodal forces F (n,): displacements, followed by the forces."""
+        m, dim = self.unknowns, len(self.components)
+        turned = np.roll(force[:m].reshape(-1, dim), 1, axis=1).ravel()
+        operator = Convolution(self.kernel, accuracy)
+        moved = np.roll((operator @ turned).reshape(-1, dim), -1, axis=1).ravel()
+        return np.concatenate([moved, force[:m], np.zeros(dim)])
+
+    def compliance(self, T: sp.csr_matrix) -> np.ndarray:
+        k, dim = int(np.prod(self.grid)), len(self.components)
+        order = (np.arange(k)[:, None] * dim + np.roll(np.arange(dim), -1)).ravel()
+        C = self.kernel.entries()[np.ix_(order, order)]  # in the order of the components
+        local = T[:, : k * dim]
+        made = local @ (local @ C).T
+        return np.asarray((made + made.T) / 2)
+
+    def moved(self, T: sp.csr_matrix) -> np.ndarray:
+        return np.asarray(np.diff(T.indptr) > 0)
+
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        return np.asarray(self.at_rest + self.motions @ multipliers + self._compliance_product(force))
+
+    def energy(self, U: np.ndarray) -> float:
+        force = U[self.unknowns : 2 * self.unknowns]
+        return float(force @ self._compliance_product(force)[: self.unknowns]) / 2
+
+    def external_forces(self, U: np.ndarray) -> np.ndarray:
+        """What keeps the body in equilibrium with the contact forces; it acts on the body as a whole."""
+        m, dim = self.unknowns, len(self.components)
+        return np.concatenate([np.zeros(2 * m), -U[m : 2 * m].reshape(-1, dim).sum(axis=0)])
+
+    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Nothing: a half-space is held at infinity."""
+        return {}
+
+    def fields(self, U: np.ndarray) -> None:
+        return None
+
+    def loaded(self, scene: Scene, part: HalfSpace) -> HalfSpaceBody:
+        """With other values of the total force and of the displacement."""
+        return replace(self, part=part)
+
+
+def _infinite(body: HalfSpaceBody) -> Kernel:
+    distances = tuple(np.arange(m // 2 + 1) for m in embedding(body.grid))
+    if len(body.grid) == 1:
+        length = body.spacing[0] * len(body.ticks[0])
+        depth = 10 * length if body.part.depth is None else body.part.depth
+        if depth < length:
+            raise InputError(
+                f"half-plane '{body.name}': its depth ({depth:g}) must be at least the length of its points ({length:g})."
+            )
+        coefficients = half_plane_influence(body.part.material, body.spacing[0], distances[0], depth)
+    else:
+        spacing = (body.spacing[0], body.spacing[1])
+        coefficients = half_space_influence(body.part.material, spacing, (distances[0], distances[1]))
+    last = len(body.grid)
+    turned = {}
+    for (a, b), part in coefficients.items():
+        if a < last and b == last:  # the displacement under a normal force; the pair wanted is the other way round
+            turned[0, a + 1] = -body.outward * part
+        else:
+            turned[(a + 1) % (last + 1), (b + 1) % (last + 1)] = part
+    return Kernel.of_coefficients(body.grid, turned)
+
+
+def _periodic(body: HalfSpaceBody) -> Kernel:
+    """The kernel of tractions that are trigonometric polynomials on the grid; their mean makes no displacement.
+
+    Under tractions with the wave vector k the surface moves by (1 - nu)/(G |k|) along the normal and along k, by
+    1/(G |k|) across k, and by (1 - 2 nu)/(2 G |k|) along k under normal tractions, with a quarter of a period between.
+    Sources: Johnson (1985), section 13.2; Stanley, Kato (1997), An FFT-based method for rough surface contact.
+    """
+    G, nu = lame(body.part.material)[1], body.part.material.nu
+    grid, spacing = body.grid, body.spacing
+    waves = [2 * np.pi * np.fft.fftfreq(n, h) for n, h in zip(grid, spacing)]
+    waves[-1] = 2 * np.pi * np.fft.rfftfreq(grid[-1], spacing[-1])
+    k = np.meshgrid(*waves, indexing="ij")
+    size = np.sqrt(sum(part**2 for part in k))
+    over = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
+    cell = np.prod(spacing)
+    symbols = {(0, 0): (1 - nu) / (G * cell) * over}
+    for axis, part in enumerate(k):
+        odd = np.where(np.isclose(np.abs(part), np.pi / spacing[axis]), 0.0, part)
+        symbols[0, axis + 1] = body.outward * (1 - 2 * nu) / (2 * G * cell) * odd * over**2
+        symbols[axis + 1, axis + 1] = (over - nu * part**2 * over**3) / (G * cell)
+    if len(grid) == 2:
+        first, second = (np.where(np.isclose(np.abs(part), np.pi / h), 0.0, part) for part, h in zip(k, spacing))
+        symbols[1, 2] = -nu * first * second * over**3 / (G * cell)
+    return Kernel(grid, grid, symbols)
+
+
+def assemble_half_space(scene: Scene, part: HalfSpace, elements: int, zone: float | None) -> HalfSpaceBody:
+    """A HalfSpace of a scene on its grid for `elements` and `zone`; the upper body fills the upper half."""
+    if scene.kind == "axisymmetric" or scene.copies > 1:
+        raise InputError(
+            f"half-space '{part.name}': scene '{scene.name}' must be 'plane-strain' or 'solid' with copies = 1, because the "
+            "forces between its points know no symmetry."
+        )
+    outward = -1.0 if part is scene.upper else 1.0
+    thickness = scene.thickness if scene.dim == 2 else 1.0
+    return HalfSpaceBody(part, scene.components, part.ticks(elements, zone, scene.dim - 1), outward, thickness)

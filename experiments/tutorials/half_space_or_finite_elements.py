@@ -1,0 +1,177 @@
+# %% [markdown]
+# # 9. Half-space or finite elements?
+#
+# A body that is large beside its contact looks like a half-space from there: everything above (or below) a plane is elastic.
+# A half-space needs no mesh, because Boussinesq knew in 1885 how its surface moves under a force. In this tutorial we solve
+# the same contact, a rigid sphere on a block, with finite elements and with a half-space. We look at what each costs for a
+# given accuracy. Then we make the block small, and see when the half-space is wrong.
+#
+# Reading time: 10 minutes. [From bodies to compliance](from_bodies_to_compliance.py) explains $Q$ for finite elements.
+
+# %%
+import time
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from contactopt import HalfSpace, Material, Rigid, Scene, reduce, scenes, solve
+from contactopt.analytic import contact_modulus, hertz_point
+
+rubber = Material(E=5.0, nu=0.3)
+P, R = 100.0, 400.0  # N, mm
+exact = hertz_point(P, R, contact_modulus(rubber))
+print(
+    f"Hertz: contact radius {exact.half_width:.3f} mm, peak pressure {exact.peak:.4f} MPa, approach {exact.approach:.4f} mm"
+)
+
+# %% [markdown]
+# ## What a half-space is here
+#
+# We put points on a square of the surface, evenly spaced by $h$. Each point stands for a cell of $h \times h$ that carries a
+# uniform traction. A unit of force on one cell moves the middle of another cell by the integral of $1/\rho$ over the loaded
+# cell, which Love wrote down in closed form in 1929. It depends on the distance of the cells alone. So $Q$ is a convolution,
+# and a product $Qr$ costs a few fast Fourier transforms, whatever the shape of the contact.
+
+# %%
+a = exact.half_width
+
+
+def on_half_space(n: int) -> Scene:
+    """The sphere on n x n points of a square that is 2.5 contact radii wide."""
+    x = (np.arange(n) + 0.5) * 2.5 * a / n - 1.25 * a
+    sphere = Rigid("sphere", gap=lambda p: (p[0] ** 2 + p[1] ** 2) / (2 * R), force={"z": -P})
+    return Scene("sphere", sphere, HalfSpace("block", rubber, (x, x)), 0.0, kind="solid", law="frictionless")
+
+
+small = reduce(on_half_space(12))
+Q = small.Q.to_dense()
+assert np.allclose(Q, Q.T)
+assert np.linalg.eigvalsh(Q).min() > 0
+r = np.random.default_rng(0).normal(size=len(Q))
+assert np.allclose(small.Q @ r, Q @ r)
+
+# %% [markdown]
+# The array above has $432^2$ entries. With $512 \times 512$ points it would have $6 \cdot 10^{11}$, but the transforms need a few
+# megabytes only. Nothing else changes: the problem $u = Qr + V\lambda + q$, its solvers and its certificate are the same as
+# for finite elements.
+
+# %%
+begin = time.perf_counter()
+problem = reduce(on_half_space(256))
+solution = solve(problem)
+seconds = time.perf_counter() - begin
+pressure = solution.reactions[:, 0] / problem.areas
+assert solution.solved and problem.contacts == 65536
+assert abs(pressure.max() / exact.peak - 1) < 1e-3
+assert abs(-solution.multipliers[0] / exact.approach - 1) < 1e-4
+print(f"{problem.contacts} contacts, {seconds:.1f} s, {solution.products} products, residual {solution.residual:.0e}")
+
+# %% [markdown]
+# ## The same with finite elements
+#
+# The best finite elements can do is to use the symmetry about the axis: the scene `sphere` with a rigid sphere is a block of
+# radius and height 800 mm, 45 times the contact radius. We compare errors of the pressure, in the mean square over the
+# contact, with the time that each needs.
+
+
+# %%
+def error_and_seconds(scene: Scene) -> tuple[float, float]:
+    begin = time.perf_counter()
+    problem = reduce(scene)
+    solution = solve(problem)
+    seconds = time.perf_counter() - begin
+    distance = np.linalg.norm(problem.coordinates[: scene.dim - 1], axis=0)
+    hertz, w = exact.pressure(distance), problem.areas
+    computed = solution.reactions[:, 0] / np.maximum(w, 1e-300)
+    return float(np.sqrt(np.sum(w * (computed - hertz) ** 2) / np.sum(w * hertz**2))), seconds
+
+
+meshed = np.array([error_and_seconds(scenes.sphere(rigid="sphere", mu=0.0, elements=n)) for n in (8, 16, 32)])
+spaced = np.array([error_and_seconds(on_half_space(n)) for n in (20, 40, 80, 160)])
+
+fig, ax = plt.subplots(figsize=(5.5, 3.8), layout="constrained")
+ax.loglog(meshed[:, 1], meshed[:, 0], "o-", color="C1", label="finite elements, axisymmetric")
+ax.loglog(spaced[:, 1], spaced[:, 0], "o-", color="C0", label="half-space, 3D")
+ax.set(xlabel="seconds", ylabel="error of the pressure [-]")
+ax.legend(frameon=False)
+assert spaced[-1, 0] < 0.01
+assert spaced[-1, 0] < spaced[0, 0] / 3
+
+# %% [markdown]
+# The half-space is three-dimensional and knows nothing of the axis, yet it costs no more. Finite elements in three dimensions
+# would need about a hundred times the unknowns of the section. That is the rule: *model no more than a scene needs*. Where the
+# bodies are large beside the contact, the volume is not needed.
+#
+# ## When the half-space is wrong
+#
+# Two assumptions stand behind it. The slopes are small: $a \ll R$. And the body is large beside the contact: its thickness $H$ is
+# many times $a$. Let us break the second one. The block below gets thinner, from 40 to 2 contact radii, and is glued to a
+# rigid floor. The half-space stays what it is.
+
+# %%
+thickness = np.array([2.0, 4.0, 8.0, 16.0, 40.0])
+stiffer = []
+for H in thickness * a:
+    block = scenes.sphere(rigid="sphere", mu=0.0, elements=16, foundation_height=H, foundation_radius=800.0)
+    thin = reduce(block)
+    answer = solve(thin)
+    stiffer.append(
+        (-answer.multipliers[0] / exact.approach, (answer.reactions[:, 0] / np.maximum(thin.areas, 1e-9)).max())
+    )
+approach, peak = np.array(stiffer).T
+peak = peak / exact.peak
+
+fig, ax = plt.subplots(figsize=(5.5, 3.8), layout="constrained")
+ax.semilogx(thickness, approach, "o-", color="C1", label="approach")
+ax.semilogx(thickness, peak, "s-", color="C2", label="peak pressure")
+ax.axhline(1.0, color="C0", label="half-space")
+ax.set(xlabel="thickness of the block over contact radius, H / a", ylabel="finite elements over half-space")
+ax.legend(frameon=False)
+assert approach[0] < 0.8  # a thin block gives way less
+assert np.all(np.diff(approach) > 0)
+assert 0.9 < approach[2] < 0.95  # eight radii
+assert np.all(np.abs(peak[1:] - 1) < 0.01)
+assert abs(approach[-1] - 1) < 0.05
+
+# %% [markdown]
+# The pressure forgets the size of the block soon, because it is made near the contact. The approach remembers it longer: far away
+# from the contact the displacement falls like $1/\rho$ only, so that a block of eight radii still misses more than 5 % of it. If you
+# want pressures, a half-space is good from a few contact radii on. If you want stiffness, the body must be tens of radii large.
+#
+# ## Exercises
+#
+# **1.** How does the cost of a product grow? Measure the products and the time of the solution for 64, 128 and 256 points a side.
+# Why does the number of products hardly grow?
+#
+# <details><summary>Solution</summary>
+#
+# ```python
+# counts = [solve(reduce(on_half_space(n))).products for n in (64, 128, 256)]
+# assert max(counts) < 1.6 * min(counts)
+# ```
+#
+# Coarse grids find out which points are in contact, and the preconditioner is the inverse of the same convolution. A product costs
+# $O(n^2 \log n)$ for $n^2$ points.
+#
+# </details>
+#
+# **2.** Where does the block begin to yield? Compute the von Mises stress below the centre at depths from $0.3\,a$ to $0.7\,a$.
+#
+# <details><summary>Solution</summary>
+#
+# ```python
+# from contactopt import reduce_bodies
+# from contactopt.analysis.half_spaces import subsurface_stress
+#
+# made = reduce_bodies(on_half_space(64))
+# depths = a * np.linspace(0.3, 0.7, 21)
+# stress, mises = subsurface_stress(made, solve(made.problem), depths)
+# axis = np.argmin(np.linalg.norm(made.problem.chart.places, axis=0))
+# below = mises.reshape(len(depths), -1)[:, axis]
+# assert abs(below.max() / exact.peak - 0.62) < 0.005
+# assert abs(depths[below.argmax()] / a - 0.48) < 0.03
+# ```
+#
+# It yields below the surface, at about half a contact radius, where nobody sees it.
+#
+# </details>

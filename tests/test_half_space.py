@@ -1,0 +1,463 @@
+"""Half-spaces: kernels against quadrature and equilibrium, solutions against exact ones, one answer by every road."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad, quad
+
+import contactopt
+from contactopt import HalfSpace, InputError, Material, Part, Rigid, Scene, Support, natural_map_residual, scenes
+from contactopt.analysis.half_spaces import (
+    contact_stiffness,
+    pressure_distribution,
+    subsurface_stress,
+    surface_contact,
+    surface_maps,
+)
+from contactopt.bodies.influence import half_plane_influence, half_space_influence
+from contactopt.bodies.subsurface import boussinesq_cerruti, flamant
+from contactopt.interface.reduction import reduce_bodies
+from contactopt.problem.convolution import Convolution
+from contactopt.scenes.surfaces import read_surface, rms_slope, self_affine
+
+STEEL, SOFT = Material(5.0, 0.3), Material(2.0, 0.45)
+E_STAR = STEEL.E / (1 - STEEL.nu**2)
+LAWS = ("frictionless", "coulomb", "tresca", "bilateral", "associated")
+
+
+def ticks(n, length=10.0):
+    return (np.arange(n) + 0.5) * length / n - length / 2
+
+
+def ball(n=20, law="coulomb", mu=0.3, shear=0.4, m=None, lower=STEEL, upper=None, **changes):
+    """A paraboloid pressed on a square of n x m points and sheared."""
+    points = (ticks(n), ticks(m or n, 10.0 * (m or n) / n))
+    force = {"z": -3.0} | ({"x": shear} if shear else {})
+    above = Rigid("ball", gap=lambda x: np.sum(x[:2] ** 2, axis=0) / 20, force=force)
+    if upper is not None:
+        above = HalfSpace("ball", upper, points, height=lambda x: -np.sum(x**2, axis=0) / 20, force=force)
+    return Scene("ball", above, HalfSpace("base", lower, points, **changes), mu, kind="solid", law=law)
+
+
+@pytest.mark.parametrize("place", [(0, 0), (1, 0), (0, 1), (3, 2), (12, 5), (13, 13), (40, 2), (70, 66)])
+def test_coefficients_are_integrals_of_point_forces(place):
+    """Boussinesq's and Cerruti's displacements, integrated by adaptive quadrature over the cell in quarters."""
+    hx, hy, nu = 1.0, 0.7, STEEL.nu
+    G = STEEL.E / 2.6
+    made = half_space_influence(STEEL, (hx, hy), tuple(np.array([p]) for p in place))
+    exact = {
+        (0, 0): lambda x, y: (1 - nu) / np.hypot(x, y) + nu * x**2 / np.hypot(x, y) ** 3,
+        (1, 1): lambda x, y: (1 - nu) / np.hypot(x, y) + nu * y**2 / np.hypot(x, y) ** 3,
+        (2, 2): lambda x, y: (1 - nu) / np.hypot(x, y),
+        (0, 1): lambda x, y: nu * x * y / np.hypot(x, y) ** 3,
+        (0, 2): lambda x, y: (0.5 - nu) * x / (x**2 + y**2),
+        (1, 2): lambda x, y: (0.5 - nu) * y / (x**2 + y**2),
+    }
+    x, y = hx * place[0], hy * place[1]
+    for pair, value in exact.items():
+        if place == (0, 0) and pair[0] != pair[1]:
+            assert abs(made[pair][0, 0]) < 1e-15  # odd
+            continue
+        total = sum(
+            dblquad(lambda s, r, value=value: value(r, s), *((a - hx / 2, a) if left else (a, a + hx / 2)),
+                    *((b - hy / 2, b) if low else (b, b + hy / 2)), epsabs=1e-13, epsrel=1e-12)[0]
+            for left in (True, False) for low in (True, False) for a, b in [(x, y)]
+        )  # fmt: skip
+        assert made[pair][0, 0] == pytest.approx(total / (hx * hy) / (2 * np.pi * G), rel=1e-10)
+
+
+@pytest.mark.parametrize("place", [0, 1, 12, 13, 500])
+def test_coefficients_of_strips(place):
+    h, depth, nu, G = 0.5, 30.0, STEEL.nu, STEEL.E / 2.6
+    made = half_plane_influence(STEEL, h, np.array([place]), depth)
+    x = h * place
+    logs = (
+        quad(lambda s: np.log(abs(s)), x - h / 2, x, epsabs=1e-14)[0]
+        + quad(lambda s: np.log(abs(s)), x, x + h / 2, epsabs=1e-14)[0]
+    )
+    for pair, sign in (((0, 0), 1), ((1, 1), -1)):
+        exact = (1 - nu) / (np.pi * G) * (np.log(depth) - logs / h + sign / (2 * (1 - nu)))
+        assert made[pair][0] == pytest.approx(exact, rel=1e-10)
+    assert made[0, 1][0] == pytest.approx((1 - 2 * nu) / (4 * G) * np.sign(place))
+
+
+def test_flamants_reference_point_is_johnsons():
+    """Hertz's line contact: the surface sinks against a point at depth d by P (1 - nu^2)/(pi E) (2 ln(2 d/a) - nu/(1 - nu))."""
+    a, n, depth, P = 1.0, 2000, 500.0, 1.0
+    x = (np.arange(n) + 0.5) * 2 * a / n - a
+    made = half_plane_influence(STEEL, 2 * a / n, np.arange(n), depth)[1, 1]
+    force = 2 * P / (np.pi * a) * np.sqrt(1 - x**2) * (2 * a / n)
+    middle = np.sum(made[np.abs(np.arange(n) - n // 2)] * force)
+    exact = P * (1 - STEEL.nu**2) / (np.pi * STEEL.E) * (2 * np.log(2 * depth / a) - STEEL.nu / (1 - STEEL.nu))
+    assert middle == pytest.approx(exact, rel=1e-4)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
+def test_point_force_stresses_are_in_equilibrium_and_compatible(nu):
+    """Divergence zero, Beltrami and Michell's equations, and the force through a plane below is the force applied."""
+    place, h, unit = np.array([0.7, -0.4, 0.9]), 2e-3, np.eye(3)
+
+    def tensor(p):
+        values = boussinesq_cerruti(np.array(p[0]), np.array(p[1]), p[2], nu)
+        T = np.zeros((3, 3, 3))
+        for value, (a, b) in zip(values, ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
+            T[a, b] = T[b, a] = value
+        return T
+
+    def second(i, j, f):
+        e, d = h * unit[i], h * unit[j]
+        return (f(place + e + d) - f(place + e - d) - f(place - e + d) + f(place - e - d)) / (4 * h**2)
+
+    divergence = sum((tensor(place + h * unit[i])[i] - tensor(place - h * unit[i])[i]) / (2 * h) for i in range(3))
+    assert np.abs(divergence).max() < 1e-4 * np.abs(tensor(place)).max()
+    laplacian = sum(second(i, i, tensor) for i in range(3))
+    for i in range(3):
+        for j in range(3):
+            trace = second(i, j, lambda p: np.trace(tensor(p)))
+            assert np.abs(laplacian[i, j] + trace / (1 + nu)).max() < 1e-3 * np.abs(laplacian).max()
+    grid = np.linspace(-200, 200, 1601)
+    T = boussinesq_cerruti(*np.meshgrid(grid, grid, indexing="ij"), 2.0, nu)
+    through = T[[4, 5, 2]].sum(axis=(2, 3)) * (grid[1] - grid[0]) ** 2
+    np.testing.assert_allclose(through, -unit, atol=0.03)
+
+
+def test_line_force_stresses_balance_the_force():
+    x = np.linspace(-4000, 4000, 400001)
+    through = flamant(x, 2.0)[[2, 1]].sum(axis=2) * (x[1] - x[0])
+    np.testing.assert_allclose(through, -np.eye(2), atol=1e-3)
+
+
+@pytest.mark.parametrize("changes", [{}, {"upper": SOFT}, {"upper": STEEL}, {"m": 12}, {"periodic": True}])
+def test_operator_is_symmetric_positive_and_equal_to_its_entries(changes):
+    reduction = reduce_bodies(ball(16, **changes))
+    Q = reduction.problem.Q
+    assert isinstance(Q, Convolution)
+    entries, x = Q.to_dense(), np.random.default_rng(0).normal(size=Q.shape[0])
+    np.testing.assert_allclose(Q @ x, entries @ x, atol=1e-13)
+    np.testing.assert_allclose(entries, entries.T, atol=1e-15)
+    np.testing.assert_allclose(np.diag(entries), Q.diagonal, rtol=1e-12)
+    assert np.linalg.eigvalsh(entries).min() > -1e-13
+    np.testing.assert_allclose(Q.loosened(1e-3) @ x, entries @ x, atol=1e-5)
+    by_bodies = sum(
+        B @ body.displacement(B.T @ x, 0 * body.resultants) for B, body in zip(reduction.maps, reduction.bodies)
+    )
+    np.testing.assert_allclose(by_bodies, entries @ x, atol=1e-12)
+    np.testing.assert_allclose(contactopt.reduce(ball(16, **changes), Q="explicit").Q, entries, atol=1e-14)
+
+
+def test_equal_materials_do_not_couple_normal_and_tangential_forces():
+    Q = reduce_bodies(ball(8, upper=STEEL)).problem.Q.to_dense()
+    normal = np.arange(0, len(Q), 3)
+    assert np.abs(Q[np.ix_(normal, normal + 1)]).max() < 1e-15 * np.abs(Q).max() * 10
+    alone = reduce_bodies(ball(8)).problem.Q.to_dense()
+    assert np.abs(alone[np.ix_(normal, normal + 1)]).max() > 0.03 * np.abs(alone).max()
+    np.testing.assert_allclose(Q[np.ix_(normal, normal)], 2 * alone[np.ix_(normal, normal)], rtol=1e-12)
+
+
+def test_coarse_kernel_lumps_contacts():
+    kernel = reduce_bodies(ball(16, m=8)).problem.Q.kernel
+    Q, k = kernel.entries(), 128
+    groups = np.ravel_multi_index(tuple(np.indices((16, 8)).reshape(2, k) // 2), (8, 4))
+    lump = np.zeros((32, k))
+    lump[groups, np.arange(k)] = 0.25
+    lump = np.kron(lump, np.eye(3))
+    np.testing.assert_allclose(kernel.coarse().entries(), lump @ Q @ lump.T, atol=1e-15)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_nested_grids_give_the_answer_of_the_dense_method(law):
+    mu = 0.01 if law == "tresca" else 0.3
+    problem = contactopt.reduce(ball(26, law=law, mu=mu, shear=0.0 if law == "frictionless" else 0.4))
+    nested = contactopt.solve(problem, "nested", tol=1e-9)
+    dense = contactopt.solve(problem.explicit(), tol=1e-9)
+    assert nested.solved and dense.solved and nested.products > 0
+    assert natural_map_residual(problem.explicit(), nested.reactions, nested.multipliers) < 1e-9
+    np.testing.assert_allclose(nested.reactions, dense.reactions, atol=1e-6 * np.abs(dense.reactions).max())
+
+
+def test_odd_grids_and_strips():
+    for problem in (contactopt.reduce(ball(27, m=41)), contactopt.reduce(ball(50, m=4))):
+        assert contactopt.solve(problem).solved
+
+
+@pytest.mark.parametrize("law", ["frictionless", "coulomb"])
+def test_half_plane_is_hertz_line_contact(law):
+    x = ticks(400, 6.0)
+    scene = Scene(
+        "line",
+        Rigid("cylinder", gap=lambda p: p[0] ** 2 / 40, force={"y": -3.0}),
+        HalfSpace("base", Material(5.0, 0.0) if law == "frictionless" else Material(5.0, 0.4999), x),
+        0.3, thickness=10.0, law=law,
+    )  # fmt: skip
+    problem = contactopt.reduce(scene)
+    r = contactopt.solve(problem).reactions
+    modulus = 5.0 / (1 - scene.lower.material.nu**2)
+    exact = contactopt.analytic.hertz_line(0.3, 20.0, modulus)
+    p = r[:, 0] / problem.areas
+    assert p.max() == pytest.approx(exact.peak, rel=2e-3)
+    assert np.abs(p - exact.pressure(x)).max() < 0.03 * exact.peak
+    assert np.sqrt(np.mean((p - exact.pressure(x)) ** 2)) < 0.003 * exact.peak
+
+
+def test_depth_of_a_half_plane_moves_the_approach_only():
+    def solved(depth):
+        x = ticks(64)
+        scene = Scene(
+            "line",
+            Rigid("cylinder", gap=lambda p: p[0] ** 2 / 40, force={"y": -3.0}),
+            HalfSpace("base", STEEL, x, depth=depth), 0.3,
+        )  # fmt: skip
+        return contactopt.solve(contactopt.reduce(scene), tol=1e-11)
+
+    near, far = solved(50.0), solved(500.0)
+    np.testing.assert_allclose(near.reactions, far.reactions, atol=1e-8)
+    assert near.multipliers[0] - far.multipliers[0] == pytest.approx(3.0 * 2 / (np.pi * E_STAR) * np.log(10), rel=1e-8)
+
+
+def approach_error(n):
+    a = (3 * 3.0 * 10 / (4 * E_STAR)) ** (1 / 3)
+    x = (np.arange(n) + 0.5) * 2.5 * a / n - 1.25 * a
+    scene = Scene(
+        "hertz",
+        Rigid("ball", gap=lambda p: np.sum(p[:2] ** 2, axis=0) / 20, force={"z": -3.0}),
+        HalfSpace("base", STEEL, (x, x)), 0.0, kind="solid", law="frictionless",
+    )  # fmt: skip
+    solution = contactopt.solve(contactopt.reduce(scene), tol=1e-10)
+    return abs(-solution.multipliers[0] / (a**2 / 10) - 1)
+
+
+def test_hertz_point_contact_converges():
+    sizes = np.array([8, 16, 32, 64])
+    errors = [approach_error(n) for n in sizes]
+    assert errors[-1] < 1e-4 and np.polyfit(np.log(sizes), np.log(errors), 1)[0] < -1.8  # second order in the mean
+
+
+def test_hertz_scene_below_the_surface():
+    result = contactopt.run("hertz-half-space", elements=48)
+    exact, problem = result.scene.reference, result.problem
+    assert result.summary["approach"] == pytest.approx(exact.approach, rel=1e-3)
+    assert result.summary["max_pressure"] == pytest.approx(exact.peak, rel=1e-3)
+    assert np.sqrt(surface_contact(problem, result.solution).area / np.pi) == pytest.approx(exact.half_width, rel=5e-3)
+    depths = exact.half_width * np.linspace(0.4, 0.56, 9)
+    stress, mises = subsurface_stress(result.reduction, result.solution, depths)
+    on_axis = mises.reshape(len(depths), -1)[:, np.argmin(np.linalg.norm(problem.chart.places, axis=0))]
+    assert on_axis.max() == pytest.approx(0.6200 * exact.peak, rel=2e-3)
+    assert depths[on_axis.argmax()] == pytest.approx(0.481 * exact.half_width, rel=0.05)
+    assert np.all(stress[..., 2, 2].reshape(len(depths), -1)[:, 0] <= 0)
+
+
+def test_upper_half_space_mirrors_the_lower():
+    """The same contact seen upside down: the rough body below, the half-space above."""
+    points = (ticks(16), ticks(12, 7.5))
+    gap = lambda p: (p[0] - 0.3) ** 2 / 20 + (p[1] + 0.5) ** 2 / 25  # noqa: E731
+    down = Scene(
+        "a",
+        Rigid("r", gap=gap, force={"z": -2.0, "x": 0.2, "y": 0.1}),
+        HalfSpace("h", STEEL, points),
+        0.3,
+        kind="solid",
+    )
+    up = Scene(
+        "a",
+        HalfSpace("h", STEEL, points, force={"z": -2.0, "x": -0.2, "y": -0.1}),
+        Rigid("r", gap=gap),
+        0.3,
+        kind="solid",
+    )
+    first, second = (contactopt.solve(contactopt.reduce(s), tol=1e-10).reactions for s in (down, up))
+    np.testing.assert_allclose(first[:, 0], second[:, 0], atol=1e-8)
+    np.testing.assert_allclose(first[:, 1:], -second[:, 1:], atol=1e-8)
+
+
+def test_turned_by_a_right_angle_it_is_the_same():
+    one = contactopt.solve(contactopt.reduce(ball(20, m=14)), tol=1e-10).reactions.reshape(20, 14, 3)
+    points = (ticks(14, 7.0), ticks(20))
+    rigid = Rigid("ball", gap=lambda x: np.sum(x[:2] ** 2, axis=0) / 20, force={"z": -3.0, "y": 0.4})
+    scene = Scene("ball", rigid, HalfSpace("base", STEEL, points), 0.3, kind="solid")
+    other = contactopt.solve(contactopt.reduce(scene), tol=1e-10).reactions.reshape(14, 20, 3)
+    np.testing.assert_allclose(other.transpose(1, 0, 2)[..., [0, 2, 1]], one, atol=1e-8)
+
+
+def test_cattaneo_scene():
+    result = contactopt.run("cattaneo-half-space", elements=24, material=Material(5.0, 0.0))
+    exact, problem, r = result.scene.reference, result.problem, result.solution.reactions
+    distance = np.linalg.norm(problem.chart.places, axis=0)
+    found, q = -r[:, 1] / problem.areas, exact.shear(distance)
+    assert np.linalg.norm(found - q) < 0.03 * np.linalg.norm(q)
+    stick = surface_contact(problem, result.solution).stick_area
+    assert np.sqrt(stick / np.pi) == pytest.approx(exact.stick_half_width, rel=0.02)
+    assert -r[:, 1].sum() == pytest.approx(25.0)
+
+
+def test_shear_cycle_loses_what_mindlin_says():
+    from dataclasses import replace
+
+    scene = scenes.cattaneo_half_space(material=Material(5.0, 0.0), shear=25.0, elements=24)
+    states = []
+    for shear in [0.0, 25.0, -25.0, 25.0]:
+        states.append(replace(scene, upper=replace(scene.upper, force={"x": shear, "z": -100.0})))
+    path = contactopt.follow(states)
+    work = path.history["friction_work"]
+    assert path.solved and path.history["energy_error"].max() < 1e-10
+    modulus = 5.0 / 2
+    tangential = contactopt.analytic.tangential_modulus(Material(5.0, 0.0), Material(5.0, 0.0))
+    exact = contactopt.analytic.cycle_loss_point(100.0, 400.0, modulus, tangential, 0.5, 25.0)
+    assert work[3] - work[1] == pytest.approx(exact, rel=0.05)  # two large steps; many converge to the loop
+
+
+def test_stiffness_of_hertz_contact_is_its_width():
+    problem = contactopt.reduce(ball(40, "frictionless", 0.0, 0.0))
+    solution = contactopt.solve(problem)
+    stiffness = contact_stiffness(problem, solution)
+    a = (3 * 3.0 * 10 / (4 * E_STAR)) ** (1 / 3)
+    assert stiffness[0, 0] == pytest.approx(2 * E_STAR * a, rel=0.03)
+    assert np.all(stiffness[1:, 1:] == 0)
+    edges, density = pressure_distribution(problem, solution, 20)
+    assert np.sum(density * np.diff(edges)) == pytest.approx(1)
+
+
+def test_prescribed_approach_is_the_total_force_turned_round():
+    pressed = contactopt.solve(contactopt.reduce(ball(20, "frictionless", 0.0, 0.0)), tol=1e-11)
+    points = (ticks(20), ticks(20))
+    for above in (
+        Rigid("ball", gap=lambda x: np.sum(x[:2] ** 2, axis=0) / 20, displacement={"z": pressed.multipliers[0]}),
+        HalfSpace("ball", Material(1e9, 0.3), points, lambda x: -np.sum(x**2, axis=0) / 20,
+                  displacement={"z": pressed.multipliers[0]}),
+    ):  # fmt: skip
+        scene = Scene("given", above, HalfSpace("base", STEEL, points), 0.0, kind="solid", law="frictionless")
+        moved = contactopt.solve(contactopt.reduce(scene), tol=1e-11)
+        np.testing.assert_allclose(moved.reactions, pressed.reactions, atol=1e-7)
+
+
+def test_half_space_meets_finite_elements():
+    """A block of finite elements, thick and wide beside its contact, is nearly the half-space of the same points."""
+    from contactopt.scenes.meshes import graded, rename, tensor_mesh
+
+    x = np.linspace(-1.0, 1.0, 33)
+    outer = graded(40.0, x[1] - x[0], 1.4)[1:]
+    across = np.concatenate([-1 - outer[::-1], x, 1 + outer])
+
+    def block(elements, zone):
+        mesh = rename(tensor_mesh(across, -graded(40.0, x[1] - x[0], 1.3)[::-1]), bottom="y-")
+        return mesh.with_boundaries({"contact": lambda p: (p[1] == 0) & (np.abs(p[0]) < 1)})
+
+    lower = Part("block", block, STEEL, (Support("bottom"),))
+    height = lambda p: -(p[0] ** 2) / 8  # noqa: E731
+    pairs = [
+        Scene("pair", HalfSpace("ball", STEEL, x, height=height, force={"y": -0.3}, depth=40.0), below, 0.3)
+        for below in (lower, HalfSpace("flat", STEEL, x, depth=40.0))
+    ]
+    mixed, pure = (contactopt.solve(contactopt.reduce(pair)) for pair in pairs)
+    assert mixed.solved and pure.solved
+    assert mixed.reactions[:, 0].sum() == pytest.approx(0.3)
+    assert np.abs(mixed.reactions - pure.reactions).max() < 0.05 * pure.reactions.max()
+
+
+def test_periodic_wavy_surface_is_westergaards():
+    """Mean pressure p on a rigid wave of amplitude h: contact of half-width a with p = pi E* h / L sin^2(pi a / L)."""
+    n, length, amplitude = 512, 8.0, 0.05
+    x = ticks(n, length)
+    flat = np.pi * E_STAR * amplitude / length
+    mean = 0.3 * flat
+    scene = Scene(
+        "wave",
+        Rigid("wave", gap=lambda p: amplitude * (1 - np.cos(2 * np.pi * p[0] / length)), force={"y": -mean * length}),
+        HalfSpace("base", STEEL, x, periodic=True), 0.0, law="frictionless",
+    )  # fmt: skip
+    problem = contactopt.reduce(scene)
+    solution = contactopt.solve(problem)
+    a = length / np.pi * np.arcsin(np.sqrt(0.3))
+    exact = 2 * flat * np.cos(np.pi * x / length) * np.sqrt(np.maximum(0.3 - np.sin(np.pi * x / length) ** 2, 0.0))
+    assert surface_contact(problem, solution).area / 2 == pytest.approx(a, rel=0.01)
+    assert np.sqrt(np.mean((solution.reactions[:, 0] / problem.areas - exact) ** 2)) < 0.01 * exact.max()
+
+
+def test_rough_scene_slides_in_the_end():
+    result = contactopt.run("rough", points=48, steps=3)
+    last = surface_contact(result.problem, result.solution)
+    assert result.path.solved and last.slip_area == pytest.approx(last.area)
+    history = result.path.history
+    assert history["shear_force"][-1] == pytest.approx(0.3 * history["normal_force"][-1], rel=1e-3)
+    assert np.all(np.diff(history["friction_work"]) > 0) and history["energy_error"].max() < 1e-9
+    maps = surface_maps(result.reduction, result.solution)
+    assert maps["pressure"].shape == maps["gap"].shape == (48, 48) and maps["slip"].shape == (48, 48, 2)
+    np.testing.assert_allclose(np.minimum(maps["pressure"] / maps["pressure"].max(), maps["gap"]), 0, atol=1e-7)
+
+
+def test_self_affine_surface():
+    lengths = (10.0, 10.0)
+    made = self_affine((64, 64), lengths, shortest=1.0, slope=0.2, seed=3)
+    assert rms_slope(made, lengths) == pytest.approx(0.2, rel=1e-12)
+    finer = self_affine((128, 256), lengths, shortest=1.0, slope=0.2, seed=3)
+    np.testing.assert_allclose(finer[::2, ::4], made, atol=1e-14)  # the same waves on every grid
+    power = np.abs(np.fft.fft2(self_affine((256, 256), lengths, shortest=0.2, hurst=0.6, seed=1))) ** 2
+    k = np.hypot(*np.meshgrid(*[np.fft.fftfreq(256, 1 / 256)] * 2, indexing="ij"))
+    rings = np.geomspace(2, 48, 8)
+    mean = [power[(k >= low) & (k < high)].mean() for low, high in pairwise(rings)]
+    falling = np.polyfit(np.log(np.sqrt(rings[1:] * rings[:-1])), np.log(mean), 1)[0]
+    assert falling == pytest.approx(-2 * (1 + 0.6), abs=0.25)
+    assert power[(k > 51) | (k < 0.5)].max() < 1e-20 * power.max()
+    assert not np.allclose(made, self_affine((64, 64), lengths, shortest=1.0, slope=0.2, seed=4))
+
+
+def test_surfaces_from_files(tmp_path):
+    heights = np.arange(30.0).reshape(5, 6)
+    np.save(tmp_path / "a.npy", heights)
+    np.savetxt(tmp_path / "a.txt", heights)
+    np.savetxt(tmp_path / "a.csv", heights, delimiter=",")
+    for name in ("a.npy", "a.txt", "a.csv"):
+        np.testing.assert_allclose(read_surface(tmp_path / name)[0], heights)
+    np.save(tmp_path / "holes.npy", np.where(heights > 20, np.nan, heights))
+    np.save(tmp_path / "line.npy", heights[0])
+    (tmp_path / "words.txt").write_text("one two\nthree four\n")
+    for name, message in (
+        ("holes.npy", "misses 9"),
+        ("line.npy", "4 x 4"),
+        ("words.txt", "no table"),
+        ("b.npy", "no file"),
+    ):
+        with pytest.raises(InputError, match=message):
+            read_surface(tmp_path / name)
+
+
+def test_surface_of_an_instrument(tmp_path):
+    surfalize = pytest.importorskip("surfalize")
+    heights = np.random.default_rng(0).normal(size=(8, 12))
+    surfalize.Surface(heights, 0.5, 0.25).save(str(tmp_path / "a.sur"))
+    found, lengths = read_surface(tmp_path / "a.sur")
+    np.testing.assert_allclose(found, heights.T, atol=1e-6)
+    assert lengths == pytest.approx((6.0, 2.0))
+
+
+@pytest.mark.parametrize(
+    "make,message",
+    [
+        (lambda: HalfSpace("h", 5.0, ticks(8)), "must be a Material"),
+        (lambda: contactopt.reduce(Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8)), 0.3, kind="solid")), "need 2 rows"),
+        (lambda: contactopt.reduce(Scene("s", Rigid("r"), HalfSpace("h", STEEL, [0.0, 1, 2, 4]), 0.3)), "evenly spaced"),
+        (lambda: contactopt.reduce(Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8)), 0.3, copies=2)), "no symmetry"),
+        (lambda: contactopt.reduce(Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8), depth=2.0), 0.3)), "its depth"),
+        (lambda: contactopt.reduce(ball(8, height=np.zeros((3, 3)))), "its? height|height of"),
+        (lambda: Scene("s", Rigid("r", force={"y": -1.0}, displacement={"y": 1.0}), HalfSpace("h", STEEL, ticks(8)), 0.3), "not both"),
+        (lambda: Scene("s", Rigid("r"), HalfSpace("h", STEEL, ticks(8), force={"z": -1.0}), 0.3), "no component 'z'"),
+        (lambda: self_affine((16, 16), (1.0, 1.0), shortest=0.01), "wavelengths must grow"),
+        (lambda: self_affine((16, 16), (1.0, 1.0), hurst=1.5), "Hurst"),
+        (lambda: scenes.cattaneo_half_space(shear=50.0), "slide off"),
+        (lambda: contactopt.solve(contactopt.reduce(scenes.flat_punch(2, elements=4)), "nested"), "needs half-spaces"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_stresses_are_refused_where_they_mean_nothing():
+    result = reduce_bodies(ball(8, periodic=True))
+    with pytest.raises(InputError, match="is periodic"):
+        subsurface_stress(result, contactopt.solve(result.problem), [1.0])
+    alone = reduce_bodies(ball(8))
+    with pytest.raises(InputError, match="depth below the surface"):
+        subsurface_stress(alone, contactopt.solve(alone.problem), [0.1])
+    with pytest.raises(InputError, match="no half-space named"):
+        subsurface_stress(alone, contactopt.solve(alone.problem), [1.0], "other")
