@@ -17,15 +17,23 @@ def check_number(name: str, value: float, low: float = -np.inf, high: float = np
     """Raise InputError unless value is a finite number in (low, high), or in [low, high) when `closed`."""
     try:
         good = isfinite(value) and (low <= value if closed else low < value) and value < high
-    except TypeError:
+    except (TypeError, ValueError, OverflowError):
         good = False
-    if not good:
+    if isinstance(value, (str, np.ma.core.MaskedConstant)) or not good:
         bounds = []
         if low > -np.inf:
             bounds.append(f"{'at least' if closed else 'greater than'} {low:g}")
         if high < np.inf:
             bounds.append(f"less than {high:g}")
         raise InputError(f"{name} must be a finite number {' and '.join(bounds)}".rstrip() + f"; got {value!r}.")
+
+
+def given(value: Any) -> bool:
+    """Whether an optional array is there; one that no array can be made of is there, and is refused by `real_array`."""
+    try:
+        return np.size(value) > 0
+    except ValueError:
+        return True
 
 
 def check_positive(**sizes: float) -> None:

@@ -234,3 +234,11 @@ def test_energy_balance_with_quadratic_displacement():
     path = follow([replace(dragged(d), degree=2) for d in (0.0, 1.0, 0.5)])
     assert path.solved
     np.testing.assert_allclose(path.history["energy_error"], 0.0, atol=1e-9)
+
+
+def test_a_path_refuses_states_of_other_bodies():
+    scene = scenes.flat_punch(dim=2)
+    for change in ({"material": Material(7.0, 0.1)}, {"name": "other"}):
+        other = replace(scene, upper=replace(scene.upper, **change))
+        with pytest.raises(InputError):
+            follow([scene, other], elements=2)

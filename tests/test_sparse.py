@@ -32,9 +32,10 @@ def test_both_forms_are_the_same_problem(stack):
     assert natural_map_residual(stack, r) == pytest.approx(natural_map_residual(array, r), rel=1e-12)
 
 
-@pytest.mark.parametrize("method", ["auto", "proximal", "nsgs", "admm"])
-def test_methods_solve_it(method):
+@pytest.mark.parametrize("method", ["auto", "newton", "proximal", "nsgs", "admm", "apg"])
+def test_methods_solve_it_and_keep_it_sparse(method, monkeypatch):
     problem = packing(2, 16, mu=0.3)
+    monkeypatch.setattr(InterfaceProblem, "explicit", lambda self: pytest.fail("Q was formed as an array"))
     solution = solve(problem, method, tol=1e-6, max_iterations=20_000, time_limit=20)
     assert solution.solved
     found = violations(

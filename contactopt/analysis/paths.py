@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.analysis.edges import contact_edge, stick_edge
 from contactopt.analysis.status import contact_status
@@ -156,6 +157,8 @@ def follow(
     ------
     InputError : for an empty path, or for states that are not those of one scene
     """
+    if not isinstance(scenes, Iterable) or isinstance(scenes, np.ndarray) or sp.issparse(scenes):
+        raise InputError(f"a path is a list of scenes; got {type(scenes).__name__}.")
     states: list[State] = []
     seconds: Counter[str] = Counter()
     reduction: Reduction | None = None

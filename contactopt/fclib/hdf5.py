@@ -72,6 +72,8 @@ def write(problem: InterfaceProblem, path: str | Path, title: str = "", descript
     The file appears complete or not at all. Raises InputError for other laws than Coulomb's, which FCLib cannot express, for
     a Q that is known by its products only, and for a folder that cannot be written to.
     """
+    if not isinstance(problem, InterfaceProblem):
+        raise InputError(f"what is written must be an InterfaceProblem; got {type(problem).__name__}.")
     law = problem.law
     if not (law.unilateral and law.proportional) or law.dilatant:
         raise InputError(

@@ -18,6 +18,7 @@ import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,6 +26,7 @@ import scipy.sparse as sp
 from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
 from contactopt.bodies.protocol import AssembledBody, Body, Product
+from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
 from contactopt.interface.coupling import Coupling, couple
@@ -33,7 +35,7 @@ from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
 from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, dense, estimate_diagonal, nodal_weights
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene import Scene
+from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)
 SPARSE = 0.25  # share of the entries of Q that may be other than zero for it to be kept by sparse rows
@@ -103,9 +105,10 @@ class Reduction:
     def loaded(self, scene: Scene) -> Reduction:
         """The same bodies, coupling and Q under the loads of another scene of the same structure.
 
-        Values of tractions, body forces, plate forces and support displacements may differ, and mu; nothing else is
-        looked at. Raises InputError if supports or plates hold other unknowns than here.
+        Values of tractions, body forces, plate forces and support displacements may differ, and mu; nothing else
+        may differ. Raises InputError if meshes, materials or other parts do, or if supports or plates hold other unknowns.
         """
+        _check_same(self.scene, scene)
         start = time.perf_counter()
         bodies = tuple(old.loaded(scene, part) for old, part in zip(self.bodies, scene.parts))
         q, V, s = _linear_terms(bodies, self.maps, self.couplings)
@@ -113,6 +116,28 @@ class Reduction:
         problem = replace(self.problem, q=q, V=V, s=s, law=law, motions=_names(bodies))
         seconds = {"load": time.perf_counter() - start}
         return replace(self, scene=scene, problem=problem, bodies=bodies, seconds=seconds)
+
+
+def _check_same(one: Scene, other: Scene) -> None:
+    """Raise InputError unless both scenes have the same bodies, but for their loads."""
+    if not isinstance(other, Scene):
+        raise InputError(f"a state of a path must be a Scene; got {type(other).__name__}.")
+    if (one.kind, one.degree, len(one.parts)) != (other.kind, other.degree, len(other.parts)):
+        raise InputError(f"the states '{one.name}' and '{other.name}' of a path are not those of one scene.")
+    for a, b in zip(one.parts, other.parts):
+        if type(a) is not type(b) or a.name != b.name:
+            raise InputError(f"the states of a path must have the same bodies; '{a.name}' became '{b.name}'.")
+        if isinstance(a, Part) and isinstance(b, Part) and a.material != b.material:
+            raise InputError(f"body '{a.name}' changes its material along the path; only loads may change.")
+        if isinstance(a, Part) and isinstance(b, Part) and not _same_mesh(a.mesh, b.mesh):
+            raise InputError(f"body '{a.name}' changes its mesh along the path; only loads may change.")
+
+
+def _same_mesh(one: Any, other: Any) -> bool:
+    """Whether two given meshes have the same nodes and elements; meshes that functions make are not compared."""
+    if callable(one) or callable(other):
+        return callable(one) and callable(other)
+    return one is other or (np.array_equal(one.p, other.p) and np.array_equal(one.t, other.t))
 
 
 def reduce(
@@ -182,10 +207,15 @@ def reduce_bodies(
     InputError
         As reduce().
     """
-    if Q not in FORMS:
+    if not isinstance(scene, Scene):
+        raise InputError(f"the scene must be a Scene; got {type(scene).__name__}.")
+    if not isinstance(Q, str) or Q not in FORMS:
         raise InputError(f"unknown form of Q {Q!r}; choose from {', '.join(FORMS)}.")
     elements = scene.elements if elements is None else elements
     zone = scene.zone if zone is None else zone
+    check_count("elements", elements)
+    if zone is not None:
+        check_number("the contact zone's half-width", zone, low=0.0)
     seconds: dict[str, float] = {}
     start = time.perf_counter()
     assembled = [assemble(scene, part, elements, zone) for part in scene.parts]

@@ -216,7 +216,10 @@ def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndar
 def _checked(
     problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    r = np.asarray(reactions, dtype=float)
+    try:
+        r = np.asarray(reactions, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"reactions must be an array of numbers; got {type(reactions).__name__}.") from error
     if r.shape != problem.q.shape:
         raise InputError(f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}.")
     if multipliers is None:

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.checks import real_array
+from contactopt.checks import given, real_array
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.problem.laws import Law
@@ -88,9 +88,9 @@ class InterfaceProblem:
     ):
         if (law is None) == (mu is None):
             raise InputError("give either a law or a friction coefficient mu.")
-        given = {"Q": Q, "q": q, "law": mu if law is None else law, "V": V, "s": s, "areas": areas}
+        fields = {"Q": Q, "q": q, "law": mu if law is None else law, "V": V, "s": s, "areas": areas}
         for name, value in (
-            given | {"coordinates": coordinates, "chart": chart, "pairs": pairs, "motions": motions}
+            fields | {"coordinates": coordinates, "chart": chart, "pairs": pairs, "motions": motions}
         ).items():
             object.__setattr__(self, name, value)
         self._check()
@@ -100,6 +100,9 @@ class InterfaceProblem:
         k, dim = q.shape if q.ndim == 2 else (len(q), 0)
         if dim not in (2, 3):
             raise InputError(f"q must have 2 or 3 columns (normal first), one row per contact; got shape {q.shape}.")
+        for name in ("V", "s", "areas", "coordinates"):
+            if given(getattr(self, name)):
+                object.__setattr__(self, name, real_array(name, getattr(self, name)))
         if np.size(self.V) and not np.size(self.s):
             raise InputError("V has columns but s is empty; give the resultant s of every column of V.")
         law = self.law if isinstance(self.law, Law) else Coulomb(self.law)
@@ -124,6 +127,8 @@ class InterfaceProblem:
             object.__setattr__(self, name, array)
         if self.chart is None:
             object.__setattr__(self, "chart", Chart.of_points(self.coordinates, dim))
+        elif not isinstance(self.chart, Chart):
+            raise InputError(f"chart must be a Chart; got {type(self.chart).__name__}.")
         elif self.chart.places.shape != (dim - 1, k):
             raise InputError(f"the chart must have places of shape {(dim - 1, k)}; got {self.chart.places.shape}.")
         pairs = self.pairs

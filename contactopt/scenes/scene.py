@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.checks import check_name, check_number
+from contactopt.checks import check_name, check_number, short
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.scenes.contact import Contact
@@ -65,6 +65,9 @@ class Plate:
     glued: bool = True
 
 
+LOADS = (Traction, BodyForce, Plate)
+
+
 @dataclass(frozen=True)
 class Part:
     """An elastic body.
@@ -89,6 +92,19 @@ class Part:
         check_name("the body's name", self.name)  # of its VTU file
         if not isinstance(self.material, Material):
             raise InputError(f"body '{self.name}': its material must be a Material(E, nu); got {self.material!r}.")
+
+        if not isinstance(self.contact, str):
+            raise InputError(f"body '{self.name}': its contact boundary must be a name; got {short(self.contact)}.")
+        if self.curve is not None and not callable(self.curve) and not isinstance(self.curve, Mapping):
+            raise InputError(
+                f"body '{self.name}': its curve must be a function, or a mapping from boundaries to functions."
+            )
+        for what, items, kinds in (("supports", self.supports, (Support,)), ("loads", self.loads, LOADS)):
+            if not isinstance(items, (tuple, list)) or not all(isinstance(item, kinds) for item in items):
+                names = " or ".join(kind.__name__ for kind in kinds)
+                raise InputError(
+                    f"body '{self.name}': its {what} must be a tuple of {names} objects; got {short(items)}."
+                )
 
     def curve_of(self, boundary: str) -> Callable[[np.ndarray], np.ndarray] | None:
         """The function that puts points of that contact boundary on its surface, if there is one."""
@@ -159,9 +175,14 @@ class Scene:
     contacts: tuple[Contact, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.kind not in COMPONENTS:
+        if not isinstance(self.name, str):
+            raise InputError(f"the scene's name must be a text; got {short(self.name)}.")
+        if not isinstance(self.kind, str) or self.kind not in COMPONENTS:
             raise InputError(f"scene '{self.name}': unknown kind {self.kind!r}; choose from {', '.join(COMPONENTS)}.")
         self._check_form()
+        for part in self.parts:
+            if not isinstance(part, (Part, Rigid)):
+                raise InputError(f"scene '{self.name}': a body must be a Part or a Rigid; got {short(part)}.")
         check_number("the thickness", self.thickness, low=0.0)
         if self.zone is not None:
             check_number("the contact zone's half-width", self.zone, low=0.0)
@@ -170,7 +191,7 @@ class Scene:
                 raise InputError(f"scene '{self.name}': {name} must be a whole number of at least 1; got {count!r}.")
         if self.elements > MOST_ELEMENTS:
             raise InputError(f"scene '{self.name}': elements must be at most {MOST_ELEMENTS}; got {self.elements}.")
-        if self.degree not in (1, 2):
+        if isinstance(self.degree, bool) or not isinstance(self.degree, int) or self.degree not in (1, 2):
             raise InputError(
                 f"scene '{self.name}': the degree of the displacement must be 1 or 2; got {self.degree!r}."
             )
@@ -228,15 +249,18 @@ class Scene:
 
     def _check_form(self) -> None:
         """Either the short form is given in full or the long one."""
-        short = (self.upper is not None, self.lower is not None, self.mu is not None)
+        for what, items in (("bodies", self.bodies), ("contacts", self.contacts)):
+            if not isinstance(items, (tuple, list)):
+                raise InputError(f"scene '{self.name}': its {what} must be a tuple; got {type(items).__name__}.")
+        filled = (self.upper is not None, self.lower is not None, self.mu is not None)
         if self.bodies or self.contacts:
-            if any(short) or self.law != "coulomb":
+            if any(filled) or self.law != "coulomb":
                 raise InputError(
                     f"scene '{self.name}': give either upper, lower, mu and law, or bodies and contacts, not both."
                 )
             if not self.bodies or not self.contacts:
                 raise InputError(f"scene '{self.name}': bodies and contacts belong together; one of them is empty.")
-        elif not all(short):
+        elif not all(filled):
             raise InputError(f"scene '{self.name}': give upper, lower and mu, or bodies and contacts.")
 
     def _check_pairs(self) -> None:
@@ -281,20 +305,26 @@ class Scene:
                     check_number(f"every value of the normal of rigid body '{part.name}'", value)
             return
         for support in part.supports:
-            self._check_components(part.name, support.displacement or {})
+            self._check_components(part.name, {} if support.displacement is None else support.displacement)
         for load in part.loads:
             if isinstance(load, Plate):
                 self._check_components(part.name, load.force)
-            elif len(load.value) != self.dim:
+            elif (
+                not isinstance(load.value, (tuple, list, np.ndarray))
+                or not np.iterable(load.value)
+                or len(load.value) != self.dim
+            ):
                 raise InputError(
                     f"body '{part.name}': a {type(load).__name__} needs {self.dim} values "
-                    f"({', '.join(self.components)}); got {len(load.value)}."
+                    f"({', '.join(self.components)}); got {short(load.value)}."
                 )
             else:
                 for value in load.value:
                     check_number(f"every {type(load).__name__} value of body '{part.name}'", value, -LARGEST, LARGEST)
 
     def _check_components(self, body: str, values: Mapping[str, float]) -> None:
+        if not isinstance(values, Mapping):
+            raise InputError(f"body '{body}': a value is given for each component by its name; got {short(values)}.")
         for component, value in values.items():
             if component not in self.components:
                 raise InputError(

@@ -24,6 +24,11 @@ def check_time() -> None:
         raise TimeUp
 
 
+def time_left() -> float:
+    """Seconds until the time limit of the solve that runs, at least 0; infinite without a limit."""
+    return max(_deadline.get() - time.perf_counter(), 0.0)
+
+
 @contextmanager
 def until(moment: float) -> Iterator[None]:
     """Set the deadline, a value of time.perf_counter(), for the `with` block; an earlier one of an outer solve stays."""

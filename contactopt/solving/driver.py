@@ -59,7 +59,7 @@ def solve(
         settings name a backend
     tol : bound on natural_map_residual(problem, reactions, multipliers) [-]
     max_iterations : of the method
-    time_limit : of the method [s]; the time of the certificate is not counted
+    time_limit : from the call on [s]; what cannot be interrupted, such as one factorisation, is waited for
     change_tol : bound of the paper's criterion |r_t - r_t previous| / |r_t| (1e-5 there); None: not used. If it is met
         first, the iteration ends with status `settled` unless the certificate agrees
     start : a solution of a problem of the same size, to start from instead of cold
@@ -133,14 +133,14 @@ def _run(
     message = ""
     while ended is None:
         begin = time.perf_counter()
-        iterate, ended, message = _next(steps, time_limit - recorder.clock)
+        iterate, ended, message = _next(steps, recorder.left())
         recorder.clock += time.perf_counter() - begin
         if iterate is not None:
             ended = recorder.record(*iterate, {} if operator is None else {"products": operator.products})
     status = Status.SOLVED if recorder.residual <= tol else ended
     proof = None
     if status is not Status.SOLVED and recorder.residual > CLOSE:
-        proof = infeasibility(problem, float(np.clip(time_limit - recorder.clock, *PROOF)))
+        proof = infeasibility(problem, float(np.clip(recorder.left(), *PROOF)))
         if proof is not None:
             message, status = proof.sentence, Status.INFEASIBLE
     return Solution(
@@ -191,8 +191,8 @@ def _dimensionless_start(start: Solution, problem: InterfaceProblem, scales: Sca
     multipliers = real_array("the start's array of multipliers", start.multipliers)
     if r.shape != problem.q.shape or multipliers.shape != problem.s.shape:
         raise InputError(
-            f"start has reactions {r.shape} and {len(multipliers)} multipliers; this problem needs "
-            f"{problem.q.shape} and {len(problem.s)}."
+            f"start has reactions {r.shape} and multipliers {multipliers.shape}; this problem needs "
+            f"{problem.q.shape} and {problem.s.shape}."
         )
     return scales.to_dimensionless(r, multipliers)
 
@@ -204,6 +204,7 @@ class _Recorder:
     """
 
     def __init__(self, problem, scales, tol, change_tol, max_iterations, time_limit, progress):  # type: ignore[no-untyped-def]
+        self.began = time.perf_counter()
         self.problem, self.scales, self.tol, self.change_tol = problem, scales, tol, change_tol
         self.max_iterations, self.time_limit, self.progress = max_iterations, time_limit, progress
         self.reactions, self.multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
@@ -246,7 +247,11 @@ class _Recorder:
             return Status.STALLED if repeats[0] == 1 else Status.CYCLING
         if len(self.history) >= self.max_iterations:
             return Status.ITERATION_LIMIT
-        return Status.TIME_LIMIT if self.clock > self.time_limit else None
+        return Status.TIME_LIMIT if self.left() <= 0 else None
+
+    def left(self) -> float:
+        """Seconds that the time limit leaves."""
+        return self.time_limit - (time.perf_counter() - self.began)
 
 
 def _relative(new: np.ndarray, old: np.ndarray) -> float:

@@ -50,9 +50,9 @@ def solver_type(name: str, n: int, dim: int) -> type[BodySolver]:
     Its attributes `iterative` and `releases_lock` are known before there is a matrix. Raises InputError for a name that
     is not in SOLVERS.
     """
-    if name == "auto":
+    if isinstance(name, str) and name == "auto":
         name = choose(n, dim, find_spec("pypardiso") is not None)
-    if name not in SOLVERS:
+    if not isinstance(name, str) or name not in SOLVERS:
         raise InputError(f"unknown body solver {name!r}; choose from auto, {', '.join(SOLVERS)}.")
     module, cls, _ = SOLVERS[name]
     kind: type[BodySolver] = getattr(import_module(module), cls)

@@ -194,7 +194,7 @@ class Law:
 
 def find_law(name: str) -> type[Law]:
     """The class of the law of that name; InputError if there is none."""
-    if name not in LAWS:
+    if not isinstance(name, str) or name not in LAWS:
         raise InputError(f"unknown law {name!r}; choose from {', '.join(LAWS)}.")
     module, cls, _ = LAWS[name]
     law: type[Law] = getattr(import_module(module), cls)

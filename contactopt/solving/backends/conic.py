@@ -11,6 +11,7 @@ import scipy.linalg as la
 
 from contactopt.errors import BackendError
 from contactopt.solving.backends import CONIC, Backend, find
+from contactopt.solving.deadline import check_time
 
 if TYPE_CHECKING:
     from contactopt.models import Program
@@ -79,7 +80,11 @@ def run(backend: Backend, problem: Any) -> None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            problem.solve(solver=backend.name.upper(), **backend.settings)
+            for settings in backend.rounds():
+                problem.solve(solver=backend.name.upper(), **settings)
+                if problem.status == cp.OPTIMAL:
+                    break
+        check_time()
     except (cp.SolverError, ValueError, ArithmeticError) as error:
         raise BackendError(f"conic backend '{backend.name}' failed: {error}") from error
     if any(v.value is None for v in problem.variables()):

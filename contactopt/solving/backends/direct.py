@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import scipy.sparse as sp
 from contactopt.errors import BackendError
 from contactopt.solving.backends import CONIC, find
 from contactopt.solving.backends.conic import check_semidefinite
+from contactopt.solving.deadline import check_time, time_left
 
 
 @dataclass(eq=False)
@@ -66,7 +68,14 @@ class CoulombSOCP:
     def solve(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """r (k dim,) and the multipliers lambda (p,) of the balance; BackendError if there is no answer."""
         self.solver.update(q=np.ascontiguousarray(c))
+        check_time()
+        left = time_left()
+        if isfinite(left):
+            settings = self.solver.get_settings()
+            settings.time_limit = left
+            self.solver.update(settings=settings)
         answer = self.solver.solve()
+        check_time()
         r, status = np.asarray(answer.x), str(answer.status)
         if "Infeasible" in status or not np.all(np.isfinite(r)):
             raise BackendError(f"conic backend 'clarabel' gave no answer: {status}.")

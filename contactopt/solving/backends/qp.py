@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from contactopt.errors import BackendError
 from contactopt.solving.backends import QP, Backend, find
+from contactopt.solving.deadline import TimeUp, check_time
 
 
 @dataclass(eq=False)
@@ -43,7 +44,13 @@ class BoxQP:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                answer = qpsolvers.solve_problem(problem, self.backend.name, initvals=start, **self.backend.settings)
+                for settings in self.backend.rounds():
+                    answer = qpsolvers.solve_problem(problem, self.backend.name, initvals=start, **settings)
+                    if answer.found:
+                        break
+            check_time()
+        except TimeUp:
+            raise
         except Exception as error:  # any backend may raise anything: it must not end a campaign
             raise BackendError(f"QP backend '{self.backend.name}' failed: {error}") from error
         x = answer.x

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.semismooth import Projection
 
 STEPS = 50  # of Newton's method
@@ -49,6 +50,7 @@ def project_balanced(
 
     P, D, value, error = evaluate(lam)
     for _ in range(STEPS):
+        check_time()
         if np.all(np.abs(error) <= EXACT * size):
             break
         DV = np.einsum("kab,kbp->kap", D, V.reshape(k, d, -1)).reshape(V.shape)

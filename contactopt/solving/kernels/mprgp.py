@@ -40,10 +40,11 @@ class BoxResult:
 
 
 def largest_eigenvalue(P: np.ndarray, steps: int = 10) -> float:
-    """Estimate from below of the largest eigenvalue of P (n, n), symmetric positive semidefinite, by power steps."""
-    v = (1 + 0.1 * np.cos(1.0 + np.arange(len(P)))).astype(P.dtype)
+    """Estimate from below of the largest eigenvalue of P (n, n), an array or sparse, symmetric positive semidefinite, by power steps."""
+    n = P.shape[0]
+    v = (1 + 0.1 * np.cos(1.0 + np.arange(n))).astype(P.dtype)
     value = 0.0
-    for _ in range(steps if len(P) else 0):
+    for _ in range(steps if n else 0):
         v /= np.linalg.norm(v)
         image = P @ v
         value, v = float(np.linalg.norm(image)), image

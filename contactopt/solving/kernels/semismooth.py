@@ -18,6 +18,7 @@ import scipy.linalg as la
 
 from contactopt.errors import BackendError
 from contactopt.problem.operators import Interface
+from contactopt.solving.deadline import check_time
 from contactopt.solving.notes import note
 
 logger = logging.getLogger(__name__)
@@ -192,6 +193,7 @@ def _improve(
     r = equations.project(r)[0]
     best = (np.inf, r, multipliers)
     for _ in range(steps):
+        check_time()
         residual, error, balance, D = equations.evaluate(r, multipliers)
         if residual < best[0]:
             best = (residual, r, multipliers)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.semismooth import Projection
 from contactopt.solving.kernels.sparse_blocks import Blocks, bordered
 
@@ -70,6 +71,7 @@ class ProximalEquations:
         residual, error, balance, D = self.evaluate(r, lam)
         recent = [residual]
         for steps in range(1, STEPS + 1):
+            check_time()
             change = self.step(error, balance, D)
             if change is None:
                 return (r, lam), False, steps

@@ -15,12 +15,14 @@ Distributed Optimization and Statistical Learning via ADMM, for the iteration an
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
@@ -28,6 +30,8 @@ from contactopt.solving.methods import NATIVE, Iterate
 
 OVER = 1.6  # over-relaxation, between 1.5 and 1.8 in the literature
 FIRST = 10  # iteration of the first balancing of rho
+Inverse = Callable[[np.ndarray], np.ndarray]  # x (n,) or (n, j) -> (Q + rho I)^-1 x
+
 CHANGE = 10.0  # largest factor by which rho changes at once
 WORTH = 2.0  # smallest factor that is worth a factorisation
 
@@ -37,6 +41,7 @@ class ADMM:
     """rho: first weight of r = z, in units of the mean compliance; balanced later."""
 
     rho: float = 1.0
+    sparse: ClassVar[bool] = True  # takes a sparse Q
     unsymmetric: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -77,19 +82,34 @@ class Balanced:
     """(Q + rho I) r + V lambda = right, V' r + s = 0, factorised."""
 
     def __init__(self, problem: InterfaceProblem, rho: float):
-        n = len(problem.Q)
-        matrix = problem.Q.T.copy()  # LAPACK factorises the transpose of a C array in place
-        matrix[np.arange(n), np.arange(n)] += rho
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", la.LinAlgWarning)  # an indefinite Q: the driver sees what comes of it
-            self.factor = la.lu_factor(matrix.T, overwrite_a=True, check_finite=False)
         self.V = problem.V
-        self.motions = la.lu_solve(self.factor, problem.V, check_finite=False)
+        self.inverse = _sparse_inverse(problem.Q, rho) if sp.issparse(problem.Q) else _inverse(problem.Q, rho)
+        self.motions = self.inverse(problem.V) if problem.V.shape[1] else problem.V
         self.schur = problem.V.T @ self.motions
 
     def solve(self, right: np.ndarray, s: np.ndarray) -> Iterate:
-        r = la.lu_solve(self.factor, right.ravel(), check_finite=False)
+        r = self.inverse(right.ravel())
         if len(s) == 0:
             return r.reshape(right.shape), np.zeros(0)
         multipliers = np.linalg.lstsq(self.schur, self.V.T @ r + s, rcond=None)[0]
         return (r - self.motions @ multipliers).reshape(right.shape), multipliers
+
+
+def _inverse(Q: np.ndarray, rho: float) -> Inverse:
+    """The product with the inverse of Q + rho I, by LAPACK."""
+    matrix = Q.T.copy()  # LAPACK factorises the transpose of a C array in place
+    matrix[np.arange(len(Q)), np.arange(len(Q))] += rho
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", la.LinAlgWarning)  # an indefinite Q: the driver sees what comes of it
+        factors = la.lu_factor(matrix.T, overwrite_a=True, check_finite=False)
+    return lambda x: np.asarray(la.lu_solve(factors, x, check_finite=False))
+
+
+def _sparse_inverse(Q: sp.csr_array, rho: float) -> Inverse:
+    """The same for a sparse Q, by SuperLU; raises LinAlgError where a pivot is zero."""
+    matrix = sp.csc_array(Q + rho * sp.eye_array(Q.shape[0]))
+    try:
+        factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options={"SymmetricMode": True})
+    except RuntimeError as error:
+        raise la.LinAlgError("Q + rho I is singular") from error
+    return lambda x: np.asarray(factors.solve(x))

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import sqrt
+from typing import ClassVar
 
 import numpy as np
 
@@ -36,6 +37,8 @@ ROUNDS = 20  # of disc_qp
 @dataclass(frozen=True)
 class APG:
     """No settings: the step comes from Q's largest eigenvalue."""
+
+    sparse: ClassVar[bool] = True  # takes a sparse Q
 
     def backends(self, dim: int) -> tuple[str, str]:
         return NATIVE, NATIVE

@@ -6,7 +6,7 @@
    and a few steps of the proximal loop for the last digits. They need no symmetric Q and no backend.
 3. Where these fail and Q is a symmetric array: CONES iterations of the Acary-Cadoux fixed point, convex programs.
    Where that fails too, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
-4. The proximal loop from the best of these points.
+4. The proximal loop from the best of these points, its weight falling slowly: jammed packings need hundreds of steps.
 5. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
    contact forces drawn at random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
    friction may have solutions that repel the loop and others that attract it.
@@ -48,6 +48,8 @@ CLOSE = 1e-3  # error of an interior point from which Newton's method finds the 
 LEAST = 1e-4  # weight of the first of them
 FEW = 10  # proximal steps for the last digits, each so many of which must halve the residual
 ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
+PATIENT = 100  # of the first of a sparse Q, where random forces lead nowhere
+STRONG = 0.1  # weight with which the gentle loop begins
 LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 
 
@@ -90,7 +92,10 @@ class Auto:
             return
         random = np.random.default_rng(0)
         for restarts in count():
-            last = yield from self._proximal(problem, matrix, reached, ROUND * 2**restarts, Proximal.alpha)
+            if sp.issparse(problem.Q):
+                last = yield from self._proximal(problem, matrix, reached, PATIENT * 2**restarts, STRONG, gentle=True)
+            else:
+                last = yield from self._proximal(problem, matrix, reached, ROUND * 2**restarts, Proximal.alpha)
             r = random.normal(size=problem.q.shape)
             r[:, 0] = np.abs(r[:, 0])
             r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
@@ -151,12 +156,12 @@ class Auto:
 
     @staticmethod
     def _proximal(
-        problem: InterfaceProblem, matrix: Blocks, start: Iterate, patience: int, alpha: float
+        problem: InterfaceProblem, matrix: Blocks, start: Iterate, patience: int, alpha: float, gentle: bool = False
     ) -> Generator[Iterate, None, Iterate]:
         """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last."""
         equations, check = (proximal_equations(problem, matrix) for _ in range(2))
         best, target, point = np.inf, np.inf, start
-        for done, point in enumerate(proximal_iterates(equations, start, alpha), start=1):
+        for done, point in enumerate(proximal_iterates(equations, start, alpha, gentle), start=1):
             yield point
             best = min(best, check.evaluate(*point)[0])
             if done % patience == 0:

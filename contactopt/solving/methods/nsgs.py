@@ -19,16 +19,20 @@ from math import hypot
 from typing import ClassVar
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
 from contactopt.problem.laws import Law
+from contactopt.problem.operators import Interface
+from contactopt.solving.deadline import check_time
 from contactopt.solving.methods import NATIVE, Iterate
 
 ROOT = 1e-14  # relative accuracy of the local slip problem
 STEPS = 60  # Newton or bisection steps for it
 PENALTY = 10.0  # tau V'V
+OFTEN = 100  # contacts between two looks at the clock
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,7 @@ class NSGS:
     """relaxation in (0, 2): the fraction of each local change that is taken."""
 
     relaxation: float = 1.0
+    sparse: ClassVar[bool] = True  # takes a sparse Q
     unsymmetric: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -52,18 +57,37 @@ class NSGS:
         r, lam = (np.zeros((k, dim)), np.zeros(len(s))) if start is None else (start[0].copy(), start[1])
         flat = r.reshape(-1)  # a view: changes with r
         tau = PENALTY / np.maximum(np.sum(V**2, axis=0), 1e-300)
-        rows = np.ascontiguousarray(problem.Q + (V * tau) @ V.T).reshape(k, dim, k * dim)
-        blocks = [rows[i, :, dim * i : dim * (i + 1)] for i in range(k)]
-        open_ = problem.law.lowest == 0
-        contacts = [Local(W, float(mu), not apart) for W, mu, apart in zip(blocks, problem.mu, open_)]
+        motions = V.reshape(k, dim, -1)
+        rows = [_coupling(problem.Q, dim, i) for i in range(k)]
+        bounds = zip(rows, motions, problem.mu, problem.law.lowest == 0)
+        contacts = [Local(own + (T * tau) @ T.T, float(mu), not apart) for (_, _, own), T, mu, apart in bounds]
         while True:
+            check_time()
             w = problem.q + (V @ (lam + tau * s)).reshape(k, dim)
-            for i, local in enumerate(contacts):
+            pushed = V.T @ flat
+            for i, (local, (others, Q, _), T) in enumerate(zip(contacts, rows, motions)):
+                if i % OFTEN == 0:
+                    check_time()
                 old = r[i].copy()
-                new = local.solve((rows[i] @ flat + w[i] - local.W @ old).tolist())
+                moved = Q @ flat[others] + w[i]
+                if len(s):
+                    moved += T @ (tau * pushed)
+                new = local.solve((moved - local.W @ old).tolist())
                 r[i] = new if self.relaxation == 1.0 else local.admissible(old + self.relaxation * (new - old))
+                if len(s):
+                    pushed += T.T @ (r[i] - old)
             lam = lam + tau * (V.T @ flat + s)
             yield r.copy(), lam
+
+
+def _coupling(Q: Interface, dim: int, i: int) -> tuple[slice | np.ndarray, np.ndarray, np.ndarray]:
+    """The components that move contact i, their part (dim, m) of Q, and the contact's own block (dim, dim)."""
+    own = slice(dim * i, dim * (i + 1))
+    if not sp.issparse(Q):
+        return slice(None), Q[own], Q[own, own]
+    row = Q[own]
+    others = np.unique(row.indices)
+    return others, row[:, others].toarray(), row[:, own].toarray()
 
 
 class Local:

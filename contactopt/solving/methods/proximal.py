@@ -22,10 +22,12 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
 from contactopt.solving.kernels.alart_curnier import cold_start
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
-from contactopt.solving.kernels.sparse_newton import ProximalEquations
+from contactopt.solving.kernels.sparse_newton import STEPS, ProximalEquations
 from contactopt.solving.methods import NATIVE, Iterate
 
 FALL, RISE = 5.0, 8.0
+GENTLE = 1.5, 3.0  # fall and rise of the gentle loop, which falls after subproblems of at most EASY steps only
+EASY = 6
 SMALLEST, LARGEST = 1e-12, 1e6  # weights; where even the largest fails, the loop ends
 
 
@@ -57,11 +59,20 @@ def proximal_equations(problem: InterfaceProblem, matrix: Blocks) -> ProximalEqu
     return ProximalEquations(matrix, problem.q, problem.V, problem.s, problem.law.project, compliance)
 
 
-def proximal_iterates(equations: ProximalEquations, point: Iterate, alpha: float) -> Iterator[Iterate]:
-    """Solutions of one proximal subproblem after another, or of a failed one the point that Newton's method left it at."""
+def proximal_iterates(
+    equations: ProximalEquations, point: Iterate, alpha: float, gentle: bool = False
+) -> Iterator[Iterate]:
+    """Solutions of one proximal subproblem after another, or of a failed one the point that Newton's method left it at.
+
+    gentle  alpha changes slowly, so that few subproblems fail: for problems on which every smaller alpha soon fails
+    """
+    (fall, rise), easy = (GENTLE, EASY) if gentle else ((FALL, RISE), STEPS)
     while alpha < LARGEST:
         equations.at(point[0], alpha)
-        new, solved, _ = equations.solve(*point)
+        new, solved, steps = equations.solve(*point)
         yield new
         point = new if solved else point
-        alpha = max(alpha / FALL, SMALLEST) if solved else RISE * alpha
+        if not solved:
+            alpha *= rise
+        elif steps <= easy:
+            alpha = max(alpha / fall, SMALLEST)
