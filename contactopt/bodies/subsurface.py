@@ -8,6 +8,7 @@ Sources: Johnson (1985), Contact Mechanics, sections 2.2, 2.3, 3.2 and 3.6.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy.fft import irfftn, next_fast_len, rfftn
@@ -75,7 +76,8 @@ def _coefficients(body: HalfSpaceBody, padded: tuple[int, ...], depth: float) ->
     offsets = [np.fft.fftfreq(m, 1 / m) for m in padded]
     out = _mean(body, offsets, depth, COARSE)
     near = [np.flatnonzero(np.abs(row) <= max(NEAR, 4 * depth / h)) for row, h in zip(offsets, body.spacing)]
-    out[:, :, *np.ix_(*near)] = _mean(
+    there: Any = (slice(None), slice(None), *np.ix_(*near))
+    out[there] = _mean(
         body,
         [row[some] for row, some in zip(offsets, near)],
         depth,

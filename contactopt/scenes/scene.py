@@ -237,8 +237,10 @@ class Scene:
             raise InputError(f"scene '{self.name}': unknown kind {self.kind!r}; choose from {', '.join(COMPONENTS)}.")
         self._check_form()
         for part in self.parts:
-            if not isinstance(part, (Part, Rigid)):
-                raise InputError(f"scene '{self.name}': a body must be a Part or a Rigid; got {short(part)}.")
+            if not isinstance(part, (Part, Rigid, HalfSpace)):
+                raise InputError(
+                    f"scene '{self.name}': a body must be a Part, a Rigid or a HalfSpace; got {short(part)}."
+                )
         check_number("the thickness", self.thickness, low=0.0)
         if self.zone is not None:
             check_number("the contact zone's half-width", self.zone, low=0.0)
