@@ -19,7 +19,7 @@ def check_number(name: str, value: float, low: float = -np.inf, high: float = np
         good = isfinite(value) and (low <= value if closed else low < value) and value < high
     except (TypeError, ValueError, OverflowError):
         good = False
-    if isinstance(value, str) or np.ma.is_masked(value) or not good:
+    if isinstance(value, (str, np.ma.core.MaskedConstant)) or not good:
         bounds = []
         if low > -np.inf:
             bounds.append(f"{'at least' if closed else 'greater than'} {low:g}")

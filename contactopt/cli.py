@@ -200,7 +200,7 @@ def _report(options: argparse.Namespace) -> int:
 
 def _list(options: argparse.Namespace) -> int:
     print("scenes")
-    for name, (_, what) in SCENES.items():
+    for name, (_, _, what, *_) in SCENES.items():
         print(f"  {name:26} {what}" + (" (load path)" if name in PATHS else ""))
     print("laws of contact")
     for name, (_, _, what) in LAWS.items():

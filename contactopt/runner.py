@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,8 +27,10 @@ from contactopt.problem import InterfaceProblem, Solution, alone, part_of
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
-from contactopt.scenes.scene_files import read_scene_file, with_degree
 from contactopt.solving.methods import default_method, find_method
+
+if TYPE_CHECKING:
+    from contactopt.scenes.scene_files import SceneFile
 
 # What a run writes beside summary.json and one VTU file per body.
 RUN_FILES = ("deformed.png", "pressure.png", "path.png", "interface.npz", "history.csv", "path.npz")
@@ -117,14 +119,14 @@ def run(
     InputError : on input that cannot be used, with a sentence that says what to do; nothing is left half-written
     """
     start = time.perf_counter()
-    file = None if isinstance(scene, Scene) or not str(scene).endswith(".toml") else read_scene_file(scene)
+    file = _scene_file(scene)
     told = {} if file is None else file.solve
 
     def choose(key: str, value: Any, usual: Any = None) -> Any:
         return told.get(key, usual) if value is None else value
 
     changes |= {} if elements is None else {"elements": elements}
-    states = _states(scene, changes) if file is None else with_degree(file, changes)
+    states = _states(scene, changes) if file is None else _states_of_file(file, changes)
     names = {"normal": normal, "tangential": tangential, "preconditioner": preconditioner}
     given = {key: choose(key, name) for key, name in names.items() if choose(key, name) is not None}
     method = choose("method", method) or default_method(given)
@@ -171,6 +173,21 @@ def _finish(
         made = replace(made, summary=summary | _seconds(seconds, start))
         (folder / "summary.json").write_text(json.dumps(made.summary, indent=2) + "\n")
     return made
+
+
+def _scene_file(scene: Any) -> SceneFile | None:
+    """The scene file that the name of a scene stands for; None for all other scenes."""
+    if isinstance(scene, Scene) or not str(scene).endswith(".toml"):
+        return None
+    from contactopt.scenes.scene_files import read_scene_file
+
+    return read_scene_file(scene)
+
+
+def _states_of_file(file: SceneFile, changes: dict[str, Any]) -> tuple[Scene, ...]:
+    from contactopt.scenes.scene_files import with_degree
+
+    return with_degree(file, changes)
 
 
 def _states(scene: Any, changes: dict[str, Any]) -> tuple[Scene, ...]:

@@ -9,7 +9,7 @@ from conftest import MATERIAL, two_blocks
 from mortar_scenes import couple, press_fit, resultants, ring, slab
 from skfem.quadrature import get_quadrature
 
-from contactopt import InputError, Plate, Support, reduce, scenes, solve
+from contactopt import InputError, Plate, Support, reduce, reduce_bodies, scenes, solve
 from contactopt.bodies.elements import FACES, weight_at
 from contactopt.interface.faces import Faces, cross, evaluate
 from contactopt.interface.mortar import mortar
@@ -433,3 +433,63 @@ def test_a_small_block_on_a_large_one():
         assert solution.reactions[:, 0].sum() == pytest.approx(1.0, rel=1e-8)
         results.append(solution.multipliers[0])
     assert results[1:] == pytest.approx([results[0]] * 2, rel=0.01)
+
+
+@pytest.mark.parametrize("weight", [(1.0, False), (2 * np.pi, True)])
+def test_finer_contacts_see_no_kinks_of_linear_elements(weight):
+    """A parabola that both sides interpolate linearly has no relative displacement but a constant, away from uneven cells."""
+    upper, lower = line(grid(8), 1, False, weight=weight), line(grid(24), 1, True, weight=weight)
+    m = mortar(upper, lower)
+    inner = (m.points[0] > 0.2) & (m.points[0] < 0.8)
+    seen = [W @ s.points[0] ** 2 for W, s in zip(m.weights, (upper, lower))]
+    apart = (seen[0] - seen[1])[inner]
+    assert np.ptp(apart) < 1e-3 / 8**2
+    assert apart.mean() == pytest.approx((1 / 8**2 - 1 / 24**2) / 6, rel=1e-3)  # what interpolation adds on either side
+
+
+@pytest.mark.parametrize("cuts", CUTS)
+def test_finer_contacts_see_no_kinks_in_space(cuts):
+    upper = face(grid(6), grid(6), 1, False, cuts[0])
+    lower = face(grid(18), grid(18), 1, True, cuts[1])
+    m = mortar(upper, lower)
+    inner = np.all((m.points[:2] > 0.3) & (m.points[:2] < 0.7), axis=0)
+    for field in (lambda x: x[0] ** 2, lambda x: x[0] * x[1], lambda x: x[1] ** 2 - x[0] * x[1]):
+        seen = [W @ field(s.points) for W, s in zip(m.weights, (upper, lower))]
+        assert np.ptp((seen[0] - seen[1])[inner]) < 0.15 / 6**2  # linear interpolation: 1/4 of it
+
+
+def test_frames_do_not_depend_on_the_side_that_carries():
+    """Normals are those of the lower body, seen from the contacts."""
+    upper = line(grid(24, -1, 1), 1, False, y=lambda x: x**2 / 8)
+    lower = line(grid(16, -1, 1), 1, True, y=lambda x: x**2 / 40)
+    for own in ("upper", "lower"):
+        m = mortar(upper, lower, own)
+        slope = m.points[0] / 20
+        exact = np.stack([-slope, np.ones_like(slope)]) / np.hypot(1, slope)
+        assert np.abs(m.normals - exact)[:, 1:-1].max() < 1e-3
+
+
+def test_normals_at_the_ends_of_curved_elements_are_of_second_order():
+    errors = []
+    for n in (4, 8):
+        x = grid(n, -0.5, 0.5)
+        m = mortar(line(x, 2, False, y=np.cos), line(x, 2, True, y=np.cos))
+        slope = np.sin(m.points[0])
+        exact = np.stack([slope, np.ones_like(slope)]) / np.hypot(1, slope)
+        errors.append(np.abs(m.normals - exact).max())
+    assert np.log2(errors[0] / errors[1]) > 1.8
+
+
+def test_mortar_is_chosen_where_nodes_do_not_match(caplog):
+    scene = two_blocks("plane-strain", force=3.0)
+    finer = replace(scene, lower=replace(scene.lower, mesh=slab("plane-strain", -2, 0, 7)))
+    with caplog.at_level(logging.INFO, logger="contactopt.interface"):
+        same, other = reduce_bodies(scene), reduce_bodies(finer)
+    assert (same.coupling.kind, other.coupling.kind, other.coupling.carrier) == ("matching", "mortar", "lower")
+    assert "is coupled by mortar" in caplog.text
+    problem = reduce(finer)
+    assert np.allclose(solve(problem, tol=1e-12).reactions[:, 0] / problem.areas, 3.0, rtol=1e-10)
+    coarse = replace(finer.pairs[0], carrier="upper")
+    long = replace(finer, upper=None, lower=None, mu=None, bodies=finer.parts, contacts=(coarse,))
+    assert reduce_bodies(long).coupling.carrier == "upper"
+    assert reduce(long).contacts < problem.contacts

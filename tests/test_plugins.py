@@ -32,7 +32,7 @@ class Kind:
 
 
 KINDS = {
-    "scene": Kind("A scene", "run block --elements 4", lines=2),  # SCENES holds functions, so one line imports them
+    "scene": Kind("A scene", "run block --elements 4"),
     "method": Kind("A method", "run punch-2d --mu 0.2 --elements 4 --tol 1e-3 --method projection"),
     "law": Kind("A law"),
     "coupling": Kind("A coupling", listed=False),
@@ -68,13 +68,10 @@ def add(kind: Kind, package: Path) -> tuple[list[Path], dict[Path, int]]:
             continue
         text = path.read_text()
         table = re.match(r"in (\w+), ", head)
-        if table:
-            start = re.search(OPENING.format(table=table[1]), text, re.M)
-            assert start, f"{table[1]} does not begin in {where[1]}"
-            path.write_text(insert(text, start.end(), code.rstrip(",\n") + ",\n"))
-        else:
-            assert head.startswith("import in ")
-            path.write_text(insert(text, text.index("from contactopt."), code))
+        assert table, head
+        start = re.search(OPENING.format(table=table[1]), text, re.M)
+        assert start, f"{table[1]} does not begin in {where[1]}"
+        path.write_text(insert(text, start.end(), code.rstrip(",\n") + ",\n"))
         changed[path] = changed.get(path, 0) + len(code.splitlines())
     return new, changed
 

@@ -108,6 +108,8 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
             "max_pressure": float((r[loaded, 0] / problem.areas[loaded]).max(initial=0.0)),
             "contact_half_width": width(view, own),
             "stick_half_width": stick_width(view, own)[0],
+            "coupling": view.coupling.kind,
+            "carrier": view.coupling.carrier,
             "contacts": problem.contacts,
             "open": int(status.open.sum()),
             "stick": int(status.stick.sum()),

@@ -39,7 +39,7 @@ COUPLINGS = {
     "mortar": (
         "contactopt.interface.surfaces",
         "couple_surfaces",
-        "contacts are the nodes of the finer surface, displacements are averaged where the surfaces overlap",
+        "contacts are the nodes of one surface, displacements are averaged where both overlap",
     ),
 }
 
@@ -57,6 +57,8 @@ class Coupling:
     chart         places of the contacts on the contact surface
     cells         (v, c) contacts at the corners of the linear cells of the surface, for figures and files
     planes        planes that cut the surface and on which the bodies are held along the normal only
+    kind          name in COUPLINGS
+    carrier       'upper' or 'lower': the side whose nodes carry the contacts
     """
 
     upper: sp.csr_matrix
@@ -68,6 +70,8 @@ class Coupling:
     chart: Chart
     cells: np.ndarray
     planes: tuple[SymmetryPlane, ...]
+    kind: str = "matching"
+    carrier: str = "lower"
 
 
 def couple(
@@ -91,15 +95,17 @@ def couple(
         For an unknown kind, and for surfaces that this kind cannot couple.
     """
     kind = kind or pair.coupling
-    if kind == "auto":
-        kind = "mortar" if pair.carrier is not None else "matching"
-        if upper.meshed and lower.meshed and kind == "matching":
-            try:
-                return _kind(kind)(scene, pair, upper, lower)
-            except InputError as error:
-                log.info("contact '%s' is coupled by mortar: %s", pair.name, error)
-            kind = "mortar"
-    return _kind(kind)(scene, pair, upper, lower)
+    if kind != "auto":
+        return _kind(kind)(scene, pair, upper, lower)
+    meshed = upper.meshed and lower.meshed
+    if pair.carrier is None or not meshed:
+        try:
+            return _kind("matching")(scene, pair, upper, lower)
+        except InputError as error:
+            if not meshed:
+                raise
+            log.info("contact '%s' is coupled by mortar: %s", pair.name, error)
+    return _kind("mortar")(scene, pair, upper, lower)
 
 
 def _kind(name: str) -> Callable[[Scene, Contact, AssembledBody, AssembledBody], Coupling]:

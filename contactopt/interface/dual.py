@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.interface.faces import Faces, cross
+from contactopt.interface.kinks import Rounding
 from contactopt.interface.segments import Overlap
 
 SLIVER = (
@@ -78,6 +79,7 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
     W = sp.csr_matrix((len(nodes), own.points.shape[1]))
     W_other = sp.csr_matrix((len(nodes), other.points.shape[1]))
     apart = np.zeros((own.dim, len(nodes)))
+    rounding = Rounding(other, points) if other.degree == 1 else None
     least, deepest = np.inf, np.zeros(own.dim)
     for start in range(0, len(cell), BLOCK):
         block = slice(start, start + BLOCK)
@@ -92,6 +94,14 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
                 W = W + term
             else:
                 W_other = W_other + term
+                if rounding is not None:
+                    term = collect(
+                        functional(rounding.values(block), block),
+                        row,
+                        rounding.columns(block, pairs),
+                        (len(nodes), rounding.rises.shape[0]),
+                    )
+                    W_other = W_other + term @ rounding.rises
             places.append(surface.true(surface.locations(faces[block], at[:, block])[0]))
         distance = -np.sum((places[0] - places[1]) * _unit_normals(own, points, block), axis=0)
         if distance.min() < least:

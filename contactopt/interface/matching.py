@@ -60,13 +60,14 @@ def couple_nodes(scene: Scene, pair: Contact, upper: AssembledBody, lower: Assem
         other, gap = follower.facing(lead, outward)
         first, second = (lead, other) if upper.meshed else (other, lead)
         partner, normals = np.arange(len(gap)), other.normals
+    carrier = "lower" if lower.meshed else "upper"
     held = first.held[:, partner] & second.held
     points = ContactPoints(lead.points, normals, lead.areas, lead.cells, held, gap)
     chart, frames, order = lay_out(points, scene.copies, scene.kind == "axisymmetric")
     upper_map, lower_map = local_map(first, partner[order], frames), local_map(second, order, frames)
     cells = renumbered(lead.cells, order)
     areas, places, planes = lead.areas[order], lead.points[:, order], tuple(symmetry_planes(points))
-    return Coupling(upper_map, lower_map, frames, gap[order], areas, places, chart, cells, planes)
+    return Coupling(upper_map, lower_map, frames, gap[order], areas, places, chart, cells, planes, "matching", carrier)
 
 
 def match(upper: Surface, lower: Surface) -> np.ndarray:

@@ -35,6 +35,12 @@ contains the gap itself, but at most an eighth of the size of a face (levers.SHA
 its radius by about that much, so that polygons are in equilibrium whether their curve is known or not, and the rest of a
 larger gap is left to the geometry. In an axisymmetric scene moments vanish by symmetry, and no lever is needed.
 
+**Kinks of linear elements.** With linear elements on the other side, W' has a further term, which rounds off the kinks of its
+displacement (contactopt.interface.kinks): otherwise finer contacts would follow them, and pressures converge in first order.
+
+**Frames.** Normals are those of the lower body, whichever side carries the contacts: as everywhere, and so that the answer
+does not depend on the choice.
+
 **Contacts that are supported.** Where a support holds a component at a contact's node, that component of u_i is taken from
 this node alone, and from the other body at the place that faces it (`alone`); on a plane of symmetry both are at
 rest. The cone of the contact is untouched.
@@ -138,7 +144,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
             "check the boundaries' names, the bodies' positions, and which of them is the upper one."
         )
     sums = integrate(mine, theirs, points)
-    n = sign * normals[:, sums.nodes]
+    n = normals[:, sums.nodes] if first == 1 else _seen(theirs, sums.other)
     gap = -sign * np.sum(n * sums.apart, axis=0)
     lever = np.zeros_like(n)
     if not mine.weight[1]:
@@ -157,18 +163,29 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     return Mortar(first, sums.nodes, sums.areas, n, gap, x, weights, alone, lever, carried)
 
 
+def _seen(other: Faces, weights: sp.csr_matrix) -> np.ndarray:
+    """Unit normals (dim, k) of the other side where it faces the contacts, by their weights (k, nodes)."""
+    normals = contact_normals(other)[0]
+    between = np.setdiff1d(np.arange(other.faces.shape[1]), other.cells)  # nodes that are no vertices of linear cells
+    hats = evaluate(FACES[other.kind][1], other.places[:, between])[0]
+    normals[:, other.faces[:, between]] = normals[:, other.faces[:, : other.corners]] @ hats
+    n = weights @ normals.T
+    return np.asarray((n / np.linalg.norm(n, axis=1)[:, None]).T)
+
+
 def _contacts(surface: Faces, faces: np.ndarray) -> int:
     """Number of contacts on some faces of a surface."""
     return len(np.unique(surface.faces[np.unique(faces)][:, surface.cells]))
 
 
 def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
-    """Outward unit normals (dim, n), integrals of hat functions times normals, at contact nodes; sizes (n,) of the cells."""
+    """Outward unit normals (dim, n) at contact nodes, from the linear fits on all cells around; sizes (n,) of the cells."""
     n, count = surface.points.shape[1], len(surface.faces)
     total, area = np.zeros(surface.points.shape), np.zeros(n)
     reference, hat = FACES[surface.kind][:2]
     at, share = get_quadrature(reference, 4)
     phi = evaluate(hat, at)[0]
+    dual = (phi * share).sum(axis=1)[:, None] * np.linalg.solve(phi * share @ phi.T, phi)
     share = share / len(surface.cells)  # of the reference face
     for cell in surface.cells:
         places = np.tile(surface.places[:, cell] @ phi, count)
@@ -180,7 +197,7 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
             node = surface.faces[:, corner]
             area += np.bincount(node, length @ (phi[v] * share), n)
             for d in range(len(total)):
-                total[d] += np.bincount(node, split[d] @ (phi[v] * share), n)
+                total[d] += np.bincount(node, split[d] @ (dual[v] * share), n)
     normals = np.divide(total, np.linalg.norm(total, axis=0), where=area > 0, out=np.zeros_like(total))
     return normals, area ** (1 / (surface.dim - 1))
 

@@ -141,7 +141,12 @@ def _same_mesh(one: Any, other: Any) -> bool:
 
 
 def reduce(
-    scene: Scene, elements: int | None = None, zone: float | None = None, Q: str = "auto", solver: str = "auto"
+    scene: Scene,
+    elements: int | None = None,
+    zone: float | None = None,
+    Q: str = "auto",
+    solver: str = "auto",
+    coupling: str | None = None,
 ) -> InterfaceProblem:
     """The interface problem of a scene.
 
@@ -158,6 +163,9 @@ def reduce(
         the cheaper one (contactopt.interface.costs).
     solver
         Of the bodies' linear systems: 'auto' or a name in contactopt.bodies.solvers.SOLVERS.
+    coupling
+        'auto' or a name in contactopt.interface.coupling.COUPLINGS for all pairs of surfaces; by default each has its own,
+        which is 'auto' unless its Contact says otherwise: matching nodes where they match, mortar where they do not.
 
     Returns
     -------
@@ -167,9 +175,9 @@ def reduce(
     Raises
     ------
     InputError
-        On input that cannot be modelled: unknown boundaries, nodes that do not match.
+        On input that cannot be modelled: unknown boundaries, surfaces that face each other nowhere.
     """
-    return reduce_bodies(scene, elements, zone, Q, solver).problem
+    return reduce_bodies(scene, elements, zone, Q, solver, coupling).problem
 
 
 def reduce_bodies(
@@ -186,10 +194,8 @@ def reduce_bodies(
 
     Parameters
     ----------
-    scene, elements, zone, Q, solver
+    scene, elements, zone, Q, solver, coupling
         As for reduce().
-    coupling
-        A name in contactopt.interface.coupling.COUPLINGS, for all pairs of surfaces; by default each has its own.
 
     Returns
     -------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -11,8 +13,10 @@ from contactopt.interface.charts import ContactPoints, lay_out, symmetry_planes
 from contactopt.interface.coupling import Coupling, renumbered
 from contactopt.interface.faces import Faces, faces_of
 from contactopt.interface.mortar import Mortar, mortar
-from contactopt.scenes.contact import Contact
+from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.scene import Scene
+
+log = logging.getLogger(__name__)
 
 
 def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody) -> Coupling:
@@ -50,7 +54,9 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
     chart, frames, order = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
     maps = [_map(m, i, mesh, held, frames, order) for i, mesh in enumerate(meshes)]
     areas, places, planes = m.areas[order], m.points[:, order], tuple(symmetry_planes(contacts))
-    return Coupling(maps[0], maps[1], frames, m.gap[order], areas, places, chart, renumbered(cells, order), planes)
+    cells, carrier = renumbered(cells, order), SIDES[m.own]
+    log.info("contact '%s': mortar, %d contacts on the %s body '%s'", pair.name, len(order), carrier, sides[m.own].name)
+    return Coupling(maps[0], maps[1], frames, m.gap[order], areas, places, chart, cells, planes, "mortar", carrier)
 
 
 def _mesh(surface: Surface) -> Mesh:

@@ -34,7 +34,7 @@ SYMMETRIC = 1e-2  # largest |Q - Q'|, over the largest |Q|, that counts as round
 
 logger = logging.getLogger(__name__)
 
-LARGEST = 8e9  # bytes of a Q that is formed in full from its products
+LARGEST_DENSE_BYTES = 8e9  # bytes of a Q that is formed in full from its products
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -177,13 +177,13 @@ class InterfaceProblem:
         return digest.hexdigest()[:16]
 
     def explicit(self) -> InterfaceProblem:
-        """The same problem with Q an array; InputError if that is larger than LARGEST bytes."""
+        """The same problem with Q an array; InputError if that is larger than LARGEST_DENSE_BYTES bytes."""
         if isinstance(self.Q, np.ndarray):
             return self
         size = 8 * self.q.size**2
-        if size > LARGEST:
+        if size > LARGEST_DENSE_BYTES:
             raise InputError(
-                f"Q in full would take {size / 1e9:.1f} GB, more than the {LARGEST / 1e9:g} GB that are allowed; "
+                f"Q in full would take {size / 1e9:.1f} GB, more than the {LARGEST_DENSE_BYTES / 1e9:g} GB that are allowed; "
                 "use the method 'newton', or 'alternating' with the backend 'pcg', which need products with Q only."
             )
         logger.info("forming Q in full: %d unknowns, %.3g MB", self.q.size, size / 1e6)

@@ -6,15 +6,43 @@ only there. A load path is a tuple of scenes that differ in their loads alone; c
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from contactopt.errors import InputError
-from contactopt.scenes.assemblies import arch, pin_in_bush, press_fit, stack
 from contactopt.scenes.common import with_elements
-from contactopt.scenes.flat import flat_punch, rigid_punch
-from contactopt.scenes.round import cylinder, growing_indentation, indentation, sphere
 from contactopt.scenes.scene import Scene
-from contactopt.scenes.sliding import cattaneo, shear_cycle
+
+if TYPE_CHECKING:
+    from contactopt.scenes.assemblies import arch, pin_in_bush, press_fit, stack
+    from contactopt.scenes.flat import flat_punch, rigid_punch
+    from contactopt.scenes.round import cylinder, growing_indentation, indentation, sphere
+    from contactopt.scenes.sliding import cattaneo, shear_cycle
+
+# name -> (module, function that makes the scene from keyword arguments, what it is[, arguments that the name fixes])
+SCENES: dict[str, tuple[Any, ...]] = {
+    "punch-2d": ("flat", "flat_punch", "flat punch on a foundation, plane strain, half model", {"dim": 2}),
+    "punch-3d": ("flat", "flat_punch", "square flat punch on a foundation, quarter model", {"dim": 3}),
+    "sphere": ("round", "sphere", "half sphere on a foundation, axisymmetric, contact-zone loop"),
+    "cylinder-2d": ("round", "cylinder", "half cylinder on a foundation, plane strain, contact-zone loop"),
+    "pin-in-bush": ("assemblies", "pin_in_bush", "pin in a bush with clearance, held by contact alone, half model"),
+    "press-fit": ("assemblies", "press_fit", "hollow shaft in a hub that is too narrow for it, quarter model"),
+    "stack": ("assemblies", "stack", "blocks that rest on each other, tilted, under their weight, plane strain"),
+    "arch": ("assemblies", "arch", "half circle of stones that rest on each other, under its weight, plane strain"),
+    "rigid-punch-2d": ("flat", "rigid_punch", "rigid flat punch on a half-plane", {"kind": "plane-strain"}),
+    "rigid-punch-axisymmetric": ("flat", "rigid_punch", "rigid flat disc on a half-space", {"kind": "axisymmetric"}),
+    "hertz-dissimilar": ("round", "indentation", "rigid sphere on a half-space, axisymmetric; path: growing force"),
+    "cattaneo-2d": ("sliding", "cattaneo", "two cylinders pressed and sheared; path: shear cycle", {"dim": 2}),
+    "cattaneo-3d": ("sliding", "cattaneo", "two spheres pressed and sheared; path: shear cycle", {"dim": 3}),
+}
+# the scenes whose answer depends on how the load is applied: name -> (module, function that makes the states in their
+# order[, arguments that the name fixes])
+PATHS: dict[str, tuple[Any, ...]] = {
+    "hertz-dissimilar": ("round", "growing_indentation"),
+    "cattaneo-2d": ("sliding", "shear_cycle", {"dim": 2}),
+    "cattaneo-3d": ("sliding", "shear_cycle", {"dim": 3}),
+}
+_MODULES = {entry[1]: entry[0] for entry in (*SCENES.values(), *PATHS.values())}
 
 __all__ = [
     "PATHS",
@@ -35,31 +63,12 @@ __all__ = [
     "stack",
 ]
 
-# name -> (function making the scene from keyword arguments, what it is)
-SCENES: dict[str, tuple[Callable[..., Scene], str]] = {
-    "punch-2d": (lambda **changes: flat_punch(2, **changes), "flat punch on a foundation, plane strain, half model"),
-    "punch-3d": (lambda **changes: flat_punch(3, **changes), "square flat punch on a foundation, quarter model"),
-    "sphere": (sphere, "half sphere on a foundation, axisymmetric, contact-zone loop"),
-    "cylinder-2d": (cylinder, "half cylinder on a foundation, plane strain, contact-zone loop"),
-    "pin-in-bush": (pin_in_bush, "pin in a bush with clearance, held by contact alone, plane strain, half model"),
-    "press-fit": (press_fit, "hollow shaft in a hub that is too narrow for it, plane strain, quarter model"),
-    "stack": (stack, "blocks that rest on each other, tilted, under their weight, plane strain"),
-    "arch": (arch, "half circle of stones that rest on each other, under its weight, plane strain"),
-    "rigid-punch-2d": (lambda **changes: rigid_punch("plane-strain", **changes), "rigid flat punch on a half-plane"),
-    "rigid-punch-axisymmetric": (
-        lambda **changes: rigid_punch("axisymmetric", **changes),
-        "rigid flat disc on a half-space",
-    ),
-    "hertz-dissimilar": (indentation, "rigid sphere on a half-space, axisymmetric; path: growing force"),
-    "cattaneo-2d": (lambda **changes: cattaneo(2, **changes), "two cylinders pressed and sheared; path: shear cycle"),
-    "cattaneo-3d": (lambda **changes: cattaneo(3, **changes), "two spheres pressed and sheared; path: shear cycle"),
-}
-# the scenes whose answer depends on how the load is applied: name -> function making the states in their order
-PATHS: dict[str, Callable[..., tuple[Scene, ...]]] = {
-    "hertz-dissimilar": growing_indentation,
-    "cattaneo-2d": lambda **changes: shear_cycle(2, **changes),
-    "cattaneo-3d": lambda **changes: shear_cycle(3, **changes),
-}
+
+def __getattr__(name: str) -> Any:
+    """The functions of the tables, whose modules are imported when one of them is asked for."""
+    if name in _MODULES:
+        return getattr(import_module(f"contactopt.scenes.{_MODULES[name]}"), name)
+    raise AttributeError(f"module 'contactopt.scenes' has no attribute {name!r}")
 
 
 def make_scene(name: str, *, degree: int | None = None, simplices: bool = False, **changes: object) -> Scene:
@@ -82,7 +91,7 @@ def make_scene(name: str, *, degree: int | None = None, simplices: bool = False,
     """
     if name not in SCENES:
         raise InputError(f"unknown scene {name!r}; choose from {', '.join(SCENES)}.")
-    return with_elements(_made(name, SCENES[name][0], changes), degree, simplices)
+    return with_elements(_made(name, SCENES[name], changes), degree, simplices)
 
 
 def make_path(name: str, *, degree: int | None = None, simplices: bool = False, **changes: object) -> tuple[Scene, ...]:
@@ -106,8 +115,11 @@ def make_path(name: str, *, degree: int | None = None, simplices: bool = False, 
     return tuple(with_elements(scene, degree, simplices) for scene in _made(name, PATHS[name], changes))
 
 
-def _made(name: str, make: Callable, changes: dict[str, object]):  # type: ignore[no-untyped-def]
+def _made(name: str, entry: tuple[Any, ...], changes: dict[str, object]) -> Any:
+    """What the function of a table's entry makes; InputError for arguments that it does not take."""
+    module, function = entry[:2]
+    fixed = entry[-1] if isinstance(entry[-1], dict) else {}
     try:
-        return make(**changes)
+        return getattr(import_module(f"contactopt.scenes.{module}"), function)(**fixed, **changes)
     except TypeError as error:
         raise InputError(f"scene '{name}': {error}.") from error

@@ -198,7 +198,7 @@ def described(title: str, text: str, plug_ins: dict[str, tuple[str, str, str]]) 
 
 
 def scenes_table() -> str:
-    rows = [(f"`{name}`", what, "yes" if name in PATHS else "") for name, (_, what) in SCENES.items()]
+    rows = [(f"`{name}`", what, "yes" if name in PATHS else "") for name, (_, _, what, *_) in SCENES.items()]
     return table(("scene", "what it is", "load path"), rows)
 
 

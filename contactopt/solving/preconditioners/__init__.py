@@ -101,15 +101,15 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
     find_preconditioner(name)
     if len(problem.pairs) > 1:
         return _blocks(problem, [preconditioner(part_of(problem, pair), name) for pair in problem.pairs])
-    still = held(problem.Q)
-    mean = float(np.mean(diagonal(problem.Q)[~still])) if not still.all() else 1.0
-    grid, order = grid_of(problem, still.reshape(problem.q.shape))
+    is_held = held(problem.Q)
+    mean = float(np.mean(diagonal(problem.Q)[~is_held])) if not is_held.all() else 1.0
+    grid, order = grid_of(problem, is_held.reshape(problem.q.shape))
     module, function, _ = PRECONDITIONERS[name]
     product, inverse = getattr(import_module(module), function)(grid)
 
     def on_grid(act: GridMap, factor: float) -> GridMap:
         def apply(x: np.ndarray) -> np.ndarray:
-            sorted_ = np.where(still, 0.0, x).reshape(problem.q.shape)[order]
+            sorted_ = np.where(is_held, 0.0, x).reshape(problem.q.shape)[order]
             if grid.turn is not None:
                 sorted_[:, 1:] = sorted_[:, 1:] @ grid.turn.T
             made = act(sorted_.reshape(*grid.shape, problem.dim)).reshape(problem.q.shape)
@@ -117,7 +117,7 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
                 made[:, 1:] = made[:, 1:] @ grid.turn
             out = np.empty(problem.q.shape)
             out[order] = made
-            return np.where(still, x, factor * out.ravel())  # what cannot move is on its own
+            return np.where(is_held, x, factor * out.ravel())  # what cannot move is on its own
 
         return apply
 

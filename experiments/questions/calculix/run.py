@@ -31,8 +31,8 @@ GAUSS = (1 - 1 / np.sqrt(3)) / 2
 class Run:
     """One run of ccx. failure is '' if it reached the whole load, and then:
 
-    displacement (2, N) [mm], reactions on the upper and minus those on the lower body, each (k, 2) [N] as in
-    contactopt.Solution. Iterations and seconds are known in any case: seconds as ccx says (its start excluded, reading the
+    displacement (2, N) [mm], nodal forces (n,) on each body [N], reactions on the upper and minus those on the lower body,
+    each (k, 2) [N] as in contactopt.Solution where nodes match. Iterations and seconds are known in any case: seconds as ccx says (its start excluded, reading the
     deck and writing results included), wall with its start, memory [MB] at the peak.
     """
 
@@ -43,7 +43,8 @@ class Run:
     wall: float
     memory: float
     displacement: np.ndarray
-    reactions: tuple[np.ndarray, np.ndarray]
+    forces: tuple[np.ndarray, ...]
+    reactions: tuple[np.ndarray, ...]
 
 
 def punch(elements: int = ELEMENTS, modulus: float = STIFF, mu: float = MU) -> Scene:
@@ -79,14 +80,15 @@ def run(program: str, bodies: Model, reduction: Reduction, contact: Contact) -> 
         cycles = _rows(folder / "job.cvg", 4)
         attempts = _rows(folder / "job.sta", 2)
         failure = _failure(process.returncode, log_text, wall >= LIMIT)
-        displacement, reactions = np.zeros((2, 0)), (np.zeros((0, 2)), np.zeros((0, 2)))
+        displacement, forces, reactions = np.zeros((2, 0)), (np.zeros(0),) * 2, (np.zeros((0, 2)),) * 2
         if not failure:
             tables = printed(folder / "job.dat")
             displacement = tables["displacements"][:, 1:3].T
-            reactions = _reactions(bodies, reduction, tables["stresses"])
+            forces = tuple(_forces(bodies, reduction, tables["stresses"]))
+            reactions = tuple((B @ force).reshape(-1, 2) for B, force in zip(reduction.maps, forces))
     seconds = re.search(r"Total CalculiX Time:\s*([\d.]+)", log_text)
     spent = float(seconds[1]) if seconds else wall
-    return Run(failure, cycles, attempts, spent, wall, memory, displacement, reactions)
+    return Run(failure, cycles, attempts, spent, wall, memory, displacement, forces, reactions)
 
 
 def peak_memory(process: int | str = "self") -> float:
@@ -128,8 +130,8 @@ def printed(path: Path) -> dict[str, np.ndarray]:
     return {name: np.array(table) for name, table in tables.items()}
 
 
-def _reactions(bodies: Model, reduction: Reduction, stresses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Contact forces from the stresses in the integration points, f_i = int sigma : grad phi_i, normal first.
+def _forces(bodies: Model, reduction: Reduction, stresses: np.ndarray) -> list[np.ndarray]:
+    """Nodal forces (n,) on each body from the stresses in the integration points, f_i = int sigma : grad phi_i.
 
     They need neither our stiffness nor ccx's contact law, and keep the seven digits that differences of printed
     displacements would lose. Both layers of points of a brick count half. Held components carry the support's force and
@@ -145,10 +147,7 @@ def _reactions(bodies: Model, reduction: Reduction, stresses: np.ndarray) -> tup
         lambda v, w: w.xx * v.grad[0, 0] + w.yy * v.grad[1, 1] + w.xy * (v.grad[0, 1] + v.grad[1, 0])
     )
     force = form.assemble(basis, xx=xx, yy=yy, xy=xy)[basis.nodal_dofs] * scene.thickness * scene.copies
-    out = []
-    for B, U in zip(reduction.maps, _by_body(bodies, reduction, force)):
-        out.append((B @ U).reshape(-1, 2))
-    return out[0], out[1]
+    return _by_body(bodies, reduction, force)
 
 
 def _by_body(bodies: Model, reduction: Reduction, values: np.ndarray, free: bool = True) -> list[np.ndarray]:

@@ -1,0 +1,1 @@
+"""Meshes that do not match: exactness, accuracy, cost, and CalculiX beside."""

@@ -1,0 +1,156 @@
+"""Errors on meshes that do not match over those on meshes that do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from contactopt import reduce_bodies, scenes, solve
+from contactopt.analysis.paths import follow
+from contactopt.analysis.quantities import stick_width
+from contactopt.scenes import round as round_bodies
+from contactopt.scenes.sliding import _sheared
+from experiments.questions.cattaneo import error
+from experiments.questions.nonmatching.bodies import apart, carried, press_fit, punch, stiff_punch
+
+METHODS = ("newton", "auto")
+FINE = 192
+SIZES = ((16, 16), (24, 24), (16, 24), (24, 16), (32, 32), (48, 48), (32, 48))
+SHEARS = (10.0, 30.0, 45.0)
+
+
+def hertz() -> list[dict[str, Any]]:
+    """Line and point; quadratic elements coarse away from the contact, linear ones as in the named scenes."""
+    rows = []
+    growth = round_bodies.GROWTH[2]
+    for name, force in (("cylinder", 30.0), ("sphere", 1.0)):
+        for degree in (2, 1):
+            round_bodies.GROWTH[2] = 1.5 if degree == 2 else growth
+            for sizes in ((8, 8), (12, 12), (8, 12), (12, 8), (16, 16), (24, 24), (16, 24)):
+                scene = getattr(scenes, name)(mu=0.0, force=force)
+                exact = scene.reference
+                reduction = reduce_bodies(apart(scene, *sizes, degree), zone=exact.half_width)
+                problem, solution = reduction.problem, solve(reduction.problem)
+                x, p = problem.coordinates[0], solution.reactions[:, 0] / problem.areas
+                inner = (x > 0.3 * exact.half_width) & (x < 0.9 * exact.half_width)
+                slope, value = np.polyfit(x[inner] ** 2, p[inner] ** 2, 1)
+                rows.append(
+                    {
+                        "scene": name,
+                        "degree": degree,
+                        "elements": f"{sizes[0]}:{sizes[1]}",
+                        "unknowns": reduction.dofs,
+                        "contacts": problem.contacts,
+                        "peak, rel. error": float(p.max() / exact.peak - 1),
+                        "width, rel. error": float(np.sqrt(-value / slope) / exact.half_width - 1),
+                        "p in L2": error(p, exact.pressure(x), problem.areas),
+                        "steps": solution.iterations,
+                    }
+                )
+            round_bodies.GROWTH[2] = growth
+    return rows
+
+
+def press_fits() -> list[dict[str, Any]]:
+    rows = []
+    for degree in (2, 1):
+        for carrier in ("lower", "upper"):
+            last = None
+            for n in (8, 16, 32):
+                scene, exact = press_fit((n, 3 * n // 2), degree, carrier)
+                problem = reduce_bodies(scene).problem
+                p = solve(problem).reactions[:, 0] / problem.areas
+                off = error(p, np.full(len(p), exact), problem.areas), float(np.abs(p / exact - 1).max())
+                row: dict[str, Any] = {
+                    "degree": degree,
+                    "contacts on": "fine side" if carrier == "lower" else "coarse side",
+                }
+                row |= {"elements": f"{n}:{3 * n // 2}", "p in L2": off[0], "p, largest": off[1]}
+                row |= {f"order {i}": "" if last is None else float(np.log2(last[i] / off[i])) for i in (0, 1)}
+                rows.append(
+                    {
+                        k.replace("order 0", "order in L2").replace("order 1", "order of the largest"): v
+                        for k, v in row.items()
+                    }
+                )
+                last = off
+    return rows
+
+
+def resultant_curve(problem: Any, reactions: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Contact forces between the axis and some places, (2, places): what converges where pressures are singular."""
+    order = np.argsort(problem.coordinates[0])
+    x = problem.coordinates[0][order]
+    ends = np.concatenate([[0.0], (x[1:] + x[:-1]) / 2, x[-1:]])
+    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(reactions[order], axis=0)])
+    return np.stack([np.interp(places, ends, s) for s in sums.T])
+
+
+def elastic_punch() -> list[dict[str, Any]]:
+    rows, places = [], np.linspace(0, 20, 101)
+    for degree in (1, 2):
+        fine = reduce_bodies(apart(punch(), FINE, FINE, degree)).problem
+        reference = resultant_curve(fine, solve(fine).reactions, places)
+        for sizes in SIZES:
+            problem = reduce_bodies(apart(punch(), *sizes, degree)).problem
+            found = {method: solve(problem, method=method) for method in METHODS}
+            off = resultant_curve(problem, found["newton"].reactions, places) - reference
+            scale = np.abs(reference).max(axis=1)
+            rms = np.sqrt(np.mean(off**2, axis=1)) / scale
+            row: dict[str, Any] = {"degree": degree, "elements": f"{sizes[0]}:{sizes[1]}"}
+            row |= {"normal": float(rms[0]), "tangential": float(rms[1])}
+            rows.append(row | steps(found))
+    return rows
+
+
+def rigid_punch() -> list[dict[str, Any]]:
+    """Stick ratio against Spence, exact for the rigid punch; the matching row is the named scene with a body without mesh."""
+    rows = []
+    for kind in ("plane-strain", "axisymmetric"):
+        for mu in (0.1, 0.3, 0.5):
+            for upper in (0, 48):
+                exact = scenes.rigid_punch(kind, mu=mu).reference
+                scene = scenes.rigid_punch(kind, mu=mu, elements=64) if not upper else stiff_punch(kind, upper, 64, mu)
+                reduction = reduce_bodies(scene)
+                found = {method: solve(reduction.problem, method=method) for method in METHODS}
+                ratio = stick_width(reduction, found["newton"])[0] / 20.0
+                row: dict[str, Any] = {"kind": kind, "mu": mu, "punch": "elastic, 48 cells" if upper else "rigid"}
+                row |= {"c / a": float(ratio), "exact": exact.stick_half_width / exact.half_width}
+                row |= {"error": float(ratio - exact.stick_half_width / exact.half_width)}
+                rows.append(row | steps(found))
+    return rows
+
+
+def steps(found: dict[str, Any]) -> dict[str, Any]:
+    newton, auto = (found[method] for method in METHODS)
+    return {"newton: steps": newton.iterations, "newton": newton.status.label, "auto": auto.status.label}
+
+
+def sheared(sizes: tuple[int, int], degree: int, shear: float, carrier: str | None) -> tuple[float, float, bool]:
+    """Cattaneo and Mindlin's cylinders pressed, then sheared: L2 errors of pressure and traction."""
+    scene = apart(scenes.cattaneo(2, shear=shear), *sizes, degree)
+    states = [_sheared(scene, share) for share in (0.0, 1.0)]
+    path = follow(states if carrier is None else [carried(state, carrier) for state in states])
+    problem, r = path.reduction.problem, path.solution.reactions
+    x, exact = np.abs(problem.coordinates[0]), scene.reference
+    p = error(r[:, 0] / problem.areas, exact.pressure(x), problem.areas)
+    return p, error(-r[:, 1] / problem.areas, exact.shear(x), problem.areas), path.solved
+
+
+def cattaneo() -> list[dict[str, Any]]:
+    """Root mean squares of both errors over several shears, each on meshes made for it."""
+    rows = []
+    for degree in (1, 2):
+        for sizes in ((16, 16), (24, 24), (16, 24), (24, 16)):
+            carriers: tuple[str | None, ...] = (None,) if sizes[0] == sizes[1] else ("upper", "lower")
+            for carrier in carriers:
+                found = [sheared(sizes, degree, shear, carrier) for shear in SHEARS]
+                own, other = sizes if carrier == "upper" else sizes[::-1]
+                on = "matching nodes" if own == other else "fine side" if own > other else "coarse side"
+                row: dict[str, Any] = {"degree": degree, "elements": f"{sizes[0]}:{sizes[1]}", "contacts on": on}
+                row |= {"p in L2": float(np.sqrt(np.mean([f[0] ** 2 for f in found])))}
+                row |= {"q in L2": float(np.sqrt(np.mean([f[1] ** 2 for f in found])))}
+                row |= {f"q at T = {shear:g} N": found[i][1] for i, shear in enumerate(SHEARS)}
+                rows.append(row | {"solved": all(f[2] for f in found)})
+    return rows
