@@ -36,7 +36,7 @@ from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
 from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, dense, estimate_diagonal, nodal_weights
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene import Part, Scene
+from contactopt.scenes.scene import MOST_ELEMENTS, Part, Scene
 
 log = logging.getLogger(__name__)
 SPARSE = 0.25  # share of the entries of Q that may be other than zero for it to be kept by sparse rows
@@ -215,6 +215,8 @@ def reduce_bodies(
     elements = scene.elements if elements is None else elements
     zone = scene.zone if zone is None else zone
     check_count("elements", elements)
+    if elements > MOST_ELEMENTS:
+        raise InputError(f"elements must be at most {MOST_ELEMENTS}; got {elements}.")
     if zone is not None:
         check_number("the contact zone's half-width", zone, low=0.0)
     seconds: dict[str, float] = {}

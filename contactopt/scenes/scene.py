@@ -106,6 +106,11 @@ class Part:
                     f"body '{self.name}': its {what} must be a tuple of {names} objects; got {short(items)}."
                 )
 
+        for item in (*self.supports, *self.loads):
+            boundary = "" if isinstance(item, BodyForce) else item.boundary
+            if not isinstance(boundary, str):
+                raise InputError(f"body '{self.name}': a boundary is given by its name; got {short(boundary)}.")
+
     def curve_of(self, boundary: str) -> Callable[[np.ndarray], np.ndarray] | None:
         """The function that puts points of that contact boundary on its surface, if there is one."""
         if callable(self.curve):
