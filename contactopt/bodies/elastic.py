@@ -20,7 +20,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.body import Assembly, build_body, reload_body
 from contactopt.bodies.fields import Fields, fields_of
-from contactopt.bodies.protocol import Mesh, Product, Surface
+from contactopt.bodies.protocol import Equilibrium, Mesh, Product, Surface
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.errors import InputError
@@ -69,6 +69,11 @@ class ElasticBody:
     @property
     def parallel(self) -> bool:
         return self.solver.releases_lock
+
+    @cached_property
+    def equilibrium(self) -> Equilibrium | None:
+        iteration, free = self.solver.iteration, self.body.free
+        return None if iteration is None else Equilibrium(*iteration, self.body.A.diagonal()[free], free, self.soft)
 
     @property
     def interface_compliance(self) -> np.ndarray:

@@ -26,6 +26,7 @@ from contactopt.bodies.protocol import Body
 from contactopt.errors import InputError
 from contactopt.interface.costs import form_of
 from contactopt.interface.coupling import Coupling, couple
+from contactopt.interface.equilibrium import coupled_form
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws import make_law
 from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, estimate_diagonal, nodal_weights
@@ -176,7 +177,8 @@ def _operator(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], coupling: C
     diagonal = estimate_diagonal(product, weights, np.any(moved, axis=0))
     complete, iterative = all(body.complete for body in bodies), any(body.iterative for body in bodies)
     entries = (lambda: _array(bodies, maps)) if complete else None
-    return InterfaceOperator(product, diagonal, entries, None, iterative)
+    coupled = coupled_form(bodies, maps) if iterative else None
+    return InterfaceOperator(product, diagonal, entries, None, iterative, coupled)
 
 
 def _array(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from contactopt.errors import InputError
@@ -9,9 +11,25 @@ from contactopt.problem.cones import split
 from contactopt.problem.interface_problem import InterfaceProblem
 
 
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """Q r, known from displacements that are carried along with the forces r.
+
+    value     (k dim,) [length]
+    accuracy  error of these displacements in the energy norm, relative to them: how far the bodies are from equilibrium
+    """
+
+    value: np.ndarray
+    accuracy: float
+
+
 @np.errstate(over="ignore", invalid="ignore")  # numbers beyond the range of floats are no solution
 def natural_map_residual(
-    problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray | None = None, rho: float | None = None
+    problem: InterfaceProblem,
+    reactions: np.ndarray,
+    multipliers: np.ndarray | None = None,
+    rho: float | None = None,
+    moved: Moved | None = None,
 ) -> float:
     """How far reactions are from a solution, dimensionless: the certificate of every answer.
 
@@ -25,6 +43,7 @@ def natural_map_residual(
 
     reactions    (k, dim) forces, normal first
     multipliers  (p,) displacements of the plates; None: those that fit best, by least squares
+    moved        Q r where it is known already; then its accuracy counts as well, and the largest of all is given
     Raises InputError on shapes that do not fit; returns inf if a reaction is not finite.
     Source: Acary, Bremond, Huber (2018), On solving contact problems with Coulomb friction: formulations and
     numerical comparisons.
@@ -40,15 +59,15 @@ def natural_map_residual(
     if not np.all(np.isfinite(lam)):
         return np.inf
     w = problem.q + (problem.V @ lam).reshape(r.shape)
-    moved = (problem.Q @ r.ravel()).reshape(r.shape)
-    u = moved + w
+    under = (problem.Q @ r.ravel() if moved is None else moved.value).reshape(r.shape)
+    u = under + w
     if rho is None:
-        rho = balanced_step(r, moved, u, w)
+        rho = balanced_step(r, under, u, w)
     size = max(np.linalg.norm(r), rho * np.linalg.norm(w), rho * np.linalg.norm(u))
     gap = 0.0
     if size != 0:
         gap = float(np.linalg.norm(r - problem.law.natural_map(r, u, rho)) / size)
-    worst = np.max([gap, balance_residual(problem, r)])
+    worst = np.max([gap, balance_residual(problem, r), 0.0 if moved is None else moved.accuracy])
     return float(worst) if np.isfinite(worst) else np.inf
 
 

@@ -25,7 +25,7 @@ from contactopt.errors import BackendError, InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations
-from contactopt.solving.methods import NATIVE, Iterate
+from contactopt.solving.methods import NATIVE, Iterate, Known
 from contactopt.solving.methods.cone import AcaryCadoux
 from contactopt.solving.methods.newton import Newton
 from contactopt.solving.methods.proximal import Proximal
@@ -55,7 +55,7 @@ class Auto:
     def backends(self, dim: int) -> tuple[str, str]:
         return NATIVE, NATIVE
 
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]:
         reached = yield from self._newton(problem, start, self.preconditioner)
         note(logger, "Newton's method made no progress, so cone programs and the proximal loop take over")
         try:
@@ -76,7 +76,7 @@ class Auto:
     @staticmethod
     def _newton(
         problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
-    ) -> Generator[Iterate, None, Iterate]:
+    ) -> Generator[Iterate | Known, None, Iterate]:
         """Newton's iterates; returns the best. What comes next needs the entries of Q: not before they cost no more."""
         best, reached, since = np.inf, start, 0
         operator = problem.Q if isinstance(problem.Q, InterfaceOperator) else None
@@ -84,7 +84,7 @@ class Auto:
             yield point
             since = 0 if residual < PROGRESS * best else since + 1
             if residual < best:
-                best, reached = residual, point
+                best, reached = residual, point[:2]
             tired = since >= PATIENCE or steps >= LIMIT
             if tired and (operator is None or operator.products >= problem.q.size):
                 break
