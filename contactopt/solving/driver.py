@@ -142,8 +142,8 @@ def _counts(operator: InterfaceOperator | None) -> dict[str, float]:
     """What a method has spent so far: products with Q and, where it works on the bodies themselves, V-cycles."""
     if operator is None:
         return {}
-    cycles = {} if operator.coupled is None else {"cycles": operator.coupled.cycles}
-    return {"products": operator.products} | cycles
+    counts: dict[str, float] = {"products": operator.products}
+    return counts if operator.coupled is None else counts | {"cycles": operator.coupled.cycles}
 
 
 def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> Solution:

@@ -34,6 +34,7 @@ from contactopt.solving.preconditioners import Preconditioner
 
 FIRST, LOOSEST, TIGHTEST = 0.1, 0.1, 1e-2  # accuracy of a step: the first two, and the bounds of the others
 INNER = 1e-2  # accuracy of the Schur complement of the model
+MARGIN = 1.5  # the model's Schur complement over that of a mean fit
 GIVEN = 1e-3  # accuracy of equilibrium under forces to start from
 MOST = 60  # conjugate gradient iterations towards it
 
@@ -120,7 +121,7 @@ def coupled_steps(
     start: tuple[np.ndarray, np.ndarray] | None,
 ) -> Iterator[tuple[Known, float]]:
     """Newton's iterates with the residual of the equations that each step began with; ends where a step fails."""
-    P = model_of(problem, preconditioner, deflate=False)
+    P = fitted(model_of(problem, preconditioner, deflate=False), form)
     coupled = Coupled(coulomb_equations(problem), form, P)
     at = _bonded(problem, coupled) if start is None else State(in_equilibrium(form, start[0]), *start)
     last = np.inf
@@ -145,6 +146,19 @@ def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
     if bonded is None or len(problem.s):
         return bonded or zero
     return min(zero, bonded, key=lambda state: coupled.size(coupled.linearised(state)[0]))
+
+
+def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
+    """P and its model, scaled so that the eigenvalues of P Q lie about 1 / MARGIN where a random force does most of its work.
+
+    One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur complement that is rather
+    too large than too small.
+    """
+    x = np.random.default_rng(0).normal(size=P.shape[0])
+    Qx = form.moved(form.approximate(np.asarray(form.trace.T @ x)), x)
+    factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / MARGIN, P.model
+    stiff = None if model is None else lambda y: model @ y / factor
+    return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
 
 
 def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN) -> np.ndarray:

@@ -49,7 +49,7 @@ def _run(product: Act, inverse: Act, right: np.ndarray, weights: np.ndarray, rto
     basis = [(weights * right / first).astype(SINGLE)]
     images: list[np.ndarray] = []
     H = np.zeros((RESTART + 1, RESTART))
-    y = np.zeros(0)
+    y: np.ndarray = np.zeros(0)
     for j in range(min(RESTART, n)):
         check_time()
         # The product acts on the rounded vector that is kept, so that the rounding leaves no error.
@@ -61,7 +61,7 @@ def _run(product: Act, inverse: Act, right: np.ndarray, weights: np.ndarray, rto
         H[j + 1, j] = _norm(v)
         unit = np.zeros(j + 2)
         unit[0] = first
-        y = np.linalg.lstsq(H[: j + 2, : j + 1], unit, rcond=None)[0]
+        y = np.asarray(np.linalg.lstsq(H[: j + 2, : j + 1], unit, rcond=None)[0])
         left = np.linalg.norm(unit - H[: j + 2, : j + 1] @ y)
         if left <= rtol * first or H[j + 1, j] <= FINEST * np.abs(H[: j + 1, j]).max():
             break
