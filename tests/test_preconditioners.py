@@ -16,7 +16,7 @@ from contactopt.solving.preconditioners import (
     selection,
     smooth_motions,
 )
-from contactopt.solving.preconditioners.circulant import norm, p21, p22, seminorm
+from contactopt.solving.preconditioners.circulant import extended, inverse_of_extended, seminorm
 from contactopt.solving.preconditioners.grid import Grid
 from experiments.questions.preconditioners import blocks, condition, solids
 
@@ -81,10 +81,10 @@ def test_products_are_those_of_the_dense_matrices(k):
     m = int(2 ** np.ceil(np.log2(k)))
     dense = la.circulant(seminorm(m))[:k, :k]
     line = Grid((np.arange(float(k)),), np.zeros((2, 1, 2), bool), np.ones(k))
-    assert np.allclose(p21(line)[0](np.eye(k)), dense, atol=1e-13)
+    assert np.allclose(extended(line)[0](np.eye(k)), dense, atol=1e-13)
     symbol = np.fft.fft(seminorm(m)).real / np.fft.fft(norm(m, 4 / (k - 1))).real
     inner = la.circulant(np.fft.ifft(symbol).real)[:k, :k]
-    assert np.allclose(p22(line)[0](np.eye(k)) @ inner, np.eye(k), atol=1e-9)
+    assert np.allclose(inverse_of_extended(line)[0](np.eye(k)) @ inner, np.eye(k), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", PRECONDITIONERS)

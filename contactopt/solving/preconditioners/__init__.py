@@ -28,7 +28,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import Interface, diagonal, held
-from contactopt.solving.preconditioners.grid import Product, grid_of
+from contactopt.solving.preconditioners.grid import Product
 
 ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an active set
 
@@ -48,7 +48,8 @@ class Preconditioner(LinearOperator):
         return self._matvec(x)
 
 
-# name -> (module, function of the grid of contacts giving P and, where it is cheap, P^-1, what it is)
+# name -> (module, function (problem, mask (k, dim) of what cannot move) giving products (k, dim) -> (k, dim) with P and, where
+# it is cheap, P^-1, for a Q of mean diagonal one, what it is)
 PRECONDITIONERS = {
     "p21": (
         "contactopt.solving.preconditioners.circulant",
@@ -64,6 +65,11 @@ PRECONDITIONERS = {
         "contactopt.solving.preconditioners.neumann",
         "neumann",
         "square root of the Neumann Laplacian, by the cosine transform",
+    ),
+    "laplacian": (
+        "contactopt.solving.preconditioners.surface",
+        "laplacian",
+        "square root of the Neumann Laplacian on any contact mesh, by sparse factors",
     ),
 }
 
@@ -84,26 +90,18 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
     find_preconditioner(name)
     still = held(problem.Q)
     mean = float(np.mean(diagonal(problem.Q)[~still])) if not still.all() else 1.0
-    grid, order = grid_of(problem, still.reshape(problem.q.shape))
     module, function, _ = PRECONDITIONERS[name]
-    product, inverse = getattr(import_module(module), function)(grid)
+    product, inverse = getattr(import_module(module), function)(problem, still.reshape(problem.q.shape))
 
-    def on_grid(act: Product, factor: float) -> Product:
+    def beside(act: Product, factor: float) -> Product:
         def apply(x: np.ndarray) -> np.ndarray:
-            sorted_ = np.where(still, 0.0, x).reshape(problem.q.shape)[order]
-            if grid.turn is not None:
-                sorted_[:, 1:] = sorted_[:, 1:] @ grid.turn.T
-            made = act(sorted_.reshape(*grid.shape, problem.dim)).reshape(problem.q.shape)
-            if grid.turn is not None:
-                made[:, 1:] = made[:, 1:] @ grid.turn
-            out = np.empty(problem.q.shape)
-            out[order] = made
-            return np.where(still, x, factor * out.ravel())  # what cannot move is on its own
+            made = act(np.where(still, 0.0, x).reshape(problem.q.shape))
+            return np.where(still, x, factor * made.ravel())  # what cannot move is on its own
 
         return apply
 
-    model = None if inverse is None else on_grid(inverse, mean)
-    return Preconditioner(problem.q.size, on_grid(product, 1 / mean), model)
+    model = None if inverse is None else beside(inverse, mean)
+    return Preconditioner(problem.q.size, beside(product, 1 / mean), model)
 
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:

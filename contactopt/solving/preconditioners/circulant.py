@@ -7,7 +7,8 @@ from scipy.fft import fft, ifft, irfft, rfft
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt.errors import InputError
-from contactopt.solving.preconditioners.grid import Grid, Product
+from contactopt.problem import InterfaceProblem
+from contactopt.solving.preconditioners.grid import Grid, Product, Products, on_grid
 
 INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
 
@@ -33,7 +34,17 @@ def norm(m: float, h: float) -> np.ndarray:
     return column
 
 
-def p21(grid: Grid) -> tuple[Product, None]:
+def p21(problem: InterfaceProblem, still: np.ndarray) -> Products:
+    """Eqs (25) and (29) on the grid of the contacts."""
+    return on_grid(problem, still, extended)
+
+
+def p22(problem: InterfaceProblem, still: np.ndarray) -> Products:
+    """Eq (26) on the contact line."""
+    return on_grid(problem, still, inverse_of_extended)
+
+
+def extended(grid: Grid) -> tuple[Product, None]:
     """Eq (25): E' Q_c E on a line; on a rectangle the sum of it along both directions, P31, eq (29)."""
     if grid.closed:
         symbol, smallest = closed_symbol(*grid.shape)
@@ -42,7 +53,7 @@ def p21(grid: Grid) -> tuple[Product, None]:
     return lambda X: np.sum([line(X) for line in lines], axis=0), None
 
 
-def p22(grid: Grid) -> tuple[Product, Product]:
+def inverse_of_extended(grid: Grid) -> tuple[Product, Product]:
     """Eq (26): (E' L_c^-1 Q_c E)^-1, a Toeplitz system solved by conjugate gradients; on a line only.
 
     h is the spacing over a quarter of the contact line's length, so that units do not matter.
@@ -56,7 +67,7 @@ def p22(grid: Grid) -> tuple[Product, Product]:
         return circular(1 / symbol), circular(symbol)
     m = closed_curve(k)
     symbol = rfft(seminorm(m)).real / rfft(norm(m, 4 / (k - 1))).real
-    product, guess = restricted_circulant(symbol, k, 0), p21(grid)[0]
+    product, guess = restricted_circulant(symbol, k, 0), extended(grid)[0]
     toeplitz = LinearOperator((k, k), matvec=lambda x: product(x.reshape(k, 1))[:, 0], dtype=float)
     near = LinearOperator((k, k), matvec=lambda x: guess(x.reshape(k, 1))[:, 0], dtype=float)
 
