@@ -16,7 +16,7 @@ from contactopt.solving.preconditioners import (
     selection,
     smooth_motions,
 )
-from contactopt.solving.preconditioners.circulant import extended, inverse_of_extended, seminorm
+from contactopt.solving.preconditioners.circulant import extended, inverse_of_extended, norm, seminorm
 from contactopt.solving.preconditioners.grid import Grid
 from experiments.questions.preconditioners import blocks, condition, solids
 

@@ -85,8 +85,8 @@ def solve_scene(
     elements : across the contact half-width; the scene's own number by default
     zone : half-width of contact that the mesh resolves [length]; the scene's first guess by default
     options : how to solve it
-    start : the same scene solved on another mesh, to start from. Without one, where Q is known by its products, the scene
-        is first solved on a coarser mesh, if its bodies can make one.
+    start : the same scene solved on another mesh, to start from. Without one, where Newton's steps take products with Q,
+        the scene is first solved on a coarser mesh, if its bodies can make one.
 
     Raises
     ------
@@ -97,8 +97,10 @@ def solve_scene(
     options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
     reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver)
     seconds = Counter(reduction.seconds)
-    coarser = elements // (2 if reduction.iterative else FACTOR[scene.dim])
-    if start is None and isinstance(reduction.problem.Q, InterfaceOperator) and not scene.given and coarser >= COARSEST:
+    operator = reduction.problem.Q
+    products = isinstance(operator, InterfaceOperator) and operator.coupled is None
+    coarser = elements // FACTOR[scene.dim]
+    if start is None and products and not scene.given and coarser >= COARSEST:
         begin = time.perf_counter()
         start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
         seconds.update({"coarse": time.perf_counter() - begin})

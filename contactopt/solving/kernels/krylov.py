@@ -40,18 +40,21 @@ Step = tuple[np.ndarray, np.ndarray]  # dr (k, d), dlambda (p,)
 def model_of(problem: InterfaceProblem, name: str | None = None, deflate: bool = True) -> Preconditioner:
     """The preconditioner of that name, with the smooth motions deflated if asked for; 'none': the identity.
 
-    None: `neumann` where the contacts lie on a grid, else the identity, with a note that says why.
+    None: `neumann` where the contacts lie on a grid, `laplacian` on other surfaces whose cells are known, else the identity,
+    with a note that says why.
     """
-    n = problem.q.size
-    if name != "none":
+    missing: list[str] = []
+    for choice in ("neumann", "laplacian") if name is None else (name,) * (name != "none"):
         try:
-            P = preconditioner(problem, name or "neumann")
+            P = preconditioner(problem, choice)
             return deflated(P, loosened(problem.Q, MODEL), smooth_motions(problem)) if deflate else P
         except InputError as error:
             if name is not None:
                 raise
-            note(logger, f"no preconditioner fits these contacts, so iterative steps go without one: {error}")
-    return Preconditioner(n, lambda x: x)
+            missing.append(str(error))
+    if missing:
+        note(logger, f"no preconditioner fits these contacts, so iterative steps go without one: {' '.join(missing)}")
+    return Preconditioner(problem.q.size, lambda x: x)
 
 
 def krylov_step(

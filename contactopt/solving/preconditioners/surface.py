@@ -6,7 +6,8 @@ contacts by
 
     G r = M^-1/2 L^-1/2 M^-1/2 r,   L = M^-1/2 K M^-1/2 + shift,   P = M^1/2 L^1/2 M^1/2.
 
-The shift keeps constants, which a Neumann Laplacian maps to zero; it belongs to each connected piece of the surface.
+At an edge M is what a contact inside would have, and the share of it that is there enters with the power EDGE, as in
+`neumann`. The shift keeps constants, which a Neumann Laplacian maps to zero; it belongs to each connected piece of the surface.
 Components that cannot move are left out. The inverse root is a rational function whose error falls exponentially with the
 number of its poles: each of them is one sparse factorisation of a matrix of the surface.
 
@@ -26,13 +27,14 @@ from scipy.special import ellipj, ellipk, ellipkm1
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
+from contactopt.solving.preconditioners.constants import EDGE
 
 ACCURACY = 1e-4  # of the rational function
+THINNEST = 1e-2  # nodal area over mass, relative to the mean, of a contact on an axis
 PIECE = 0.25  # shift over the least eigenvalue of a piece of the surface that is as long as this one
 
-Root = tuple[
-    Callable[[np.ndarray], np.ndarray], Callable[[np.ndarray], np.ndarray]
-]  # products with P and with G = P^-1
+Act = Callable[[np.ndarray], np.ndarray]
+Root = tuple[Act, Act]  # products with P and with G = P^-1
 
 
 def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
@@ -51,10 +53,15 @@ def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
             "the preconditioner 'laplacian' needs the cells of the contact surface, which are not known here."
         )
     own = len(problem.coordinates) == problem.dim
-    K, mass, shift = surface_matrices(problem.coordinates if own else problem.chart.places, cells)
+    K, mass, shift, share = surface_matrices(problem.coordinates if own else problem.chart.places, cells)
+    # Forces are spread over the nodal areas, which differ from the mass where the surface goes around an axis.
+    depth = problem.areas / mass
+    depth = np.maximum(depth / depth.mean(), THINNEST)
     patterns, which = np.unique(still, axis=1, return_inverse=True)
     held = [(pattern, which.ravel() == i) for i, pattern in enumerate(patterns.T) if not pattern.all()]
-    roots = [(~pattern, components, square_root(K, mass, shift, ~pattern)) for pattern, components in held]
+    roots = [
+        (~pattern, components, square_root(K, mass, shift, share, depth, ~pattern)) for pattern, components in held
+    ]
 
     def product(X: np.ndarray, inverse: bool) -> np.ndarray:
         out = np.zeros(X.shape)
@@ -68,8 +75,9 @@ def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
     return lambda X: mean * product(X, False), lambda X: product(X, True) / mean
 
 
-def surface_matrices(points: np.ndarray, cells: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
-    """Stiffness K (k, k) of the Laplacian, lumped mass (k,) and the shift (k,) of the piece that each contact is on.
+def surface_matrices(points: np.ndarray, cells: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray, np.ndarray]:
+    """Stiffness K (k, k) of the Laplacian, lumped mass (k,), the shift (k,) of the piece that each contact is on, and the
+    share (k,) of a full turn that the cells of a contact span: a half at a straight edge.
 
     Parameters
     ----------
@@ -81,11 +89,12 @@ def surface_matrices(points: np.ndarray, cells: np.ndarray) -> tuple[sp.csr_matr
         pieces, part = [cells], 1.0
     else:
         pieces, part = [cells[list(corners)] for corners in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))], 0.5
-    K, mass = sp.csr_matrix((k, k)), np.zeros(k)
+    K, mass, share = sp.csr_matrix((k, k)), np.zeros(k), np.zeros(k)
     for corners in pieces:
         gradients, measure = _simplices(points, corners)
         for i, own in enumerate(corners):
             np.add.at(mass, own, part * measure / len(corners))
+            np.add.at(share, own, part * _angle(points[:, np.roll(corners, -i, axis=0)]))
             for j, other in enumerate(corners):
                 entries = part * measure * np.einsum("dc,dc->c", gradients[i], gradients[j])
                 K = K + sp.csr_matrix((entries, (own, other)), (k, k))
@@ -94,7 +103,16 @@ def surface_matrices(points: np.ndarray, cells: np.ndarray) -> tuple[sp.csr_matr
     piece = connected_components(K, directed=False)[1]
     lengths = [np.linalg.norm(np.ptp(points[:, piece == i], axis=1)) for i in range(piece.max() + 1)]
     # The least eigenvalue of a convex surface is at least (pi / diameter)^2 (Payne, Weinberger 1960).
-    return K, mass, PIECE * (np.pi / np.array(lengths)[piece]) ** 2
+    return K, mass, PIECE * (np.pi / np.array(lengths)[piece]) ** 2, np.minimum(share, 1.0)
+
+
+def _angle(x: np.ndarray) -> np.ndarray:
+    """Share (c,) of a full turn at the first corner of lines or triangles x (d, v, c); a line is half of what meets there."""
+    if x.shape[1] == 2:
+        return np.full(x.shape[2], 0.5)
+    a, b = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+    cosine = np.sum(a * b, axis=0) / (np.linalg.norm(a, axis=0) * np.linalg.norm(b, axis=0))
+    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)) / (2 * np.pi))
 
 
 def _simplices(points: np.ndarray, corners: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
@@ -111,10 +129,13 @@ def _simplices(points: np.ndarray, corners: np.ndarray) -> tuple[list[np.ndarray
     return [-second - third, second, third], np.sqrt(square) / 2
 
 
-def square_root(K: sp.csr_matrix, mass: np.ndarray, shift: np.ndarray, moves: np.ndarray) -> Root:
+def square_root(
+    K: sp.csr_matrix, mass: np.ndarray, shift: np.ndarray, share: np.ndarray, depth: np.ndarray, moves: np.ndarray
+) -> Root:
     """Products with P and with G on the contacts of the mask `moves` (k,)."""
-    weight = np.sqrt(mass[moves])[:, None]
-    scale = sp.diags(1 / weight[:, 0])
+    full = mass[moves] / share[moves]
+    weight = (np.sqrt(full * depth[moves]) * share[moves] ** EDGE)[:, None]
+    scale = sp.diags(full**-0.5)
     L = sp.csc_matrix(scale @ K[moves][:, moves] @ scale + sp.diags(shift[moves]))
     low, high = float(shift[moves].min()), float(abs(L).sum(axis=1).max())
     eye = sp.eye(L.shape[0], format="csc")
