@@ -27,6 +27,7 @@ from contactopt.errors import InputError
 from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)
+RIGID = 1e-9  # forces below this fraction of those of a plate's motion are rounding
 KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body's stiffness is free
 
 
@@ -239,14 +240,36 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     last = place[interface] if entries else None
     made = make_solver(solver, System(A, node[body.free], component[body.free], body.locations, last))
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
-    extended = body.motion.copy()
-    extended[body.free] -= made.solve((body.A @ body.motion)[body.free])
+    # A plate that alone holds a body along itself moves it as a rigid whole, for which there is nothing to solve.
+    rigid = _rigid_extension(body)
+    extended = rigid.copy()
+    lacking = body.A @ rigid
+    strained = np.abs(lacking[body.free]).max(axis=0, initial=0.0) > RIGID * np.abs(body.A @ body.motion).max(
+        axis=0, initial=0.0
+    )
+    if strained.any():
+        extended[np.ix_(body.free, strained)] -= made.solve(lacking[np.ix_(body.free, strained)])
     K = extended.T @ (body.A @ extended)
     stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
     moves = stiffness <= KERNEL * np.max(np.sum(body.motion * (body.A @ body.motion), axis=0), initial=0.0)
     free = np.eye(len(K)) if moves.all() else vectors[:, moves]  # keep one multiplier per plate component
     modes = free, vectors[:, ~moves] / np.sqrt(stiffness[~moves])
     return _at_rest(ElasticBody(body, made, interface, body.lift, extended, modes, body.thrust), body)
+
+
+def _rigid_extension(body: Assembly) -> np.ndarray:
+    """The unit motions of the plates (n, p) with the unknowns of the same component moved along by as much.
+
+    These are translations of the body where no support holds another part of it in that component. The free unknowns of a
+    body that is held elsewhere stay at rest.
+    """
+    extended, fixed = body.motion.copy(), np.ones(len(body.load), dtype=bool)
+    fixed[body.free] = False
+    for column in extended.T:
+        component = next(row for row in body.unknowns if column[row].any())
+        if np.all(column[component][fixed[component]] == 1.0):
+            column[component] = 1.0
+    return np.asarray(extended)
 
 
 def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:
