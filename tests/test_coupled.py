@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, natural_map_residual, reduce, reduce_bodies, scenes, solve
+from contactopt.analysis import progress
+from contactopt.analysis.solve_scene import Options, solve_scene
 from contactopt.bodies.solvers.multigrid import conjugate_gradients
 from contactopt.problem.certificate import Moved
 from contactopt.problem.laws import LAWS
@@ -120,3 +122,17 @@ def test_flexible_gmres_bears_a_preconditioner_that_changes():
     for rtol in (1e-1, 1e-4, 1e-9):  # the last takes several runs
         x = flexible_gmres(lambda x: A @ x, inverse, b, weights, rtol)
         assert np.linalg.norm(weights * (b - A @ x)) <= 1.01 * rtol * np.linalg.norm(weights * b)
+
+
+def test_long_solves_say_what_they_reached(monkeypatch):
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    said: list[str] = []
+    solved = solve_scene(scenes.flat_punch(3), 4, options=Options(solver="multigrid", note=said.append))
+    steps = [line for line in said if line.startswith("step")]
+    assert len(steps) == solved.solution.iterations
+    assert "V-cycles" in steps[0] and "GiB" in steps[0] and "s left" in steps[1] and "s left" not in steps[-1]
+
+
+def test_time_left_goes_on_as_the_last_step():
+    assert progress.remaining([(0.0, 1.0), (10.0, 1e-2), (12.0, 1e-4)], 1e-8) == ", about 4 s left"
+    assert progress.remaining([(0.0, 1e-3), (1.0, 1e-2)], 1e-8) == ""

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from contactopt.analysis.constants import COARSEST, FACTOR, ROUGH
+from contactopt.analysis.progress import progress_lines
 from contactopt.interface.reduction import Reduction, reduce_bodies
 from contactopt.problem import Solution
 from contactopt.problem.operators import InterfaceOperator
@@ -37,7 +38,7 @@ class Options:
     method : as for contactopt.solve
     tol : bound on the natural-map residual
     settings : further arguments of contactopt.solve: limits, and settings of a method that is given by its name
-    note : receives one short sentence before every step that takes time
+    note : receives one short sentence before every step that takes time, and in long solves one after each iteration
     """
 
     Q: str = "auto"
@@ -106,7 +107,8 @@ def solve_scene(
         seconds.update({"coarse": time.perf_counter() - begin})
     options.note(f"solving {reduction.problem.contacts} contacts")
     first = None if start is None else transfer(start.reduction.problem, start.solution, reduction.problem)
-    solution = solve(reduction.problem, start=first, **options.of_solve)
+    lines = progress_lines(options.note, reduction.problem, options.tol)
+    solution = solve(reduction.problem, start=first, **({"progress": lines} | options.of_solve))
     seconds.update(solution.seconds)
     log.info("%s: %d elements, %s after %d iterations", scene.name, elements, solution.status, solution.iterations)
     return Solved(reduction, replace(solution, seconds=dict(seconds)))
