@@ -23,9 +23,11 @@ if TYPE_CHECKING:
     from contactopt.errors import BackendError, InputError
     from contactopt.interface.reduction import reduce, reduce_bodies
     from contactopt.material import Material
-    from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
+    from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual, siconos_residual
     from contactopt.problem.transfer import transfer
     from contactopt.runner import Result, run
+    from contactopt.scenes.contact import Contact
+    from contactopt.scenes.mesh_files import load_mesh
     from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
     from contactopt.solving.driver import solve
 
@@ -38,10 +40,12 @@ _HOMES = {
     "errors": ("BackendError", "InputError"),
     "bodies.fields": ("Fields",),
     "interface.reduction": ("reduce", "reduce_bodies"),
-    "problem": ("InterfaceProblem", "Solution", "Status", "natural_map_residual"),
+    "problem": ("InterfaceProblem", "Solution", "Status", "natural_map_residual", "siconos_residual"),
     "problem.transfer": ("transfer",),
     "runner": ("Result", "run"),
     "material": ("Material",),
+    "scenes.contact": ("Contact",),
+    "scenes.mesh_files": ("load_mesh",),
     "scenes.scene": ("BodyForce", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
     "solving.driver": ("solve",),
 }

@@ -9,6 +9,9 @@ import numpy as np
 
 from contactopt.errors import InputError
 
+RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
+LONGEST_NAME = 100  # characters
+
 
 def check_number(name: str, value: float, low: float = -np.inf, high: float = np.inf, closed: bool = False) -> None:
     """Raise InputError unless value is a finite number in (low, high), or in [low, high) when `closed`."""
@@ -51,11 +54,6 @@ def real_array(name: str, value: Any) -> np.ndarray:
     if not np.all(np.isfinite(numbers)):
         raise InputError(f"{name} holds a number that is not finite.")
     return numbers
-
-
-# Names that Windows keeps for devices, whatever the extension.
-RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
-LONGEST_NAME = 100  # characters
 
 
 def check_name(what: str, name: object) -> None:

@@ -21,6 +21,8 @@ from contactopt.solving.backends import CONIC, QP
 from contactopt.solving.methods import METHODS, NATIVE
 from contactopt.solving.preconditioners import PRECONDITIONERS
 
+FORCES = {("mm", "MPa"): "N", ("m", "Pa"): "N", ("m", "kPa"): "kN", ("m", "MPa"): "MN", ("in", "psi"): "lbf"}
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code: 0 solved, 1 not solved, 2 bad input."""
@@ -44,18 +46,16 @@ def make_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     run = commands.add_parser("run", help="solve a scene, write its summary, figures and fields")
     run.set_defaults(command=_run)
-    run.add_argument("scene", metavar="SCENE", help=", ".join(SCENES))
+    run.add_argument("scene", metavar="SCENE", help="a scene file (.toml), or " + ", ".join(SCENES))
     run.add_argument("--out", metavar="DIR", help="where files go (default: out/SCENE)")
     run.add_argument("--method", help=", ".join(METHODS) + " (auto, or alternating if a backend is named)")
     run.add_argument("--normal", metavar="BACKEND", help="QP backend of the normal problem")
     run.add_argument("--tangential", metavar="BACKEND", help="QP (2D, axisymmetric) or conic (3D) backend")
-    run.add_argument(
-        "--q", metavar="FORM", default="auto", help=", ".join(FORMS) + ": Q as an array or by its products"
-    )
+    run.add_argument("--q", metavar="FORM", help=", ".join(FORMS) + ": Q as an array or by its products")
     run.add_argument(
         "--preconditioner", metavar="NAME", help=", ".join(PRECONDITIONERS) + ", none; selects --q implicit"
     )
-    run.add_argument("--solver", metavar="NAME", default="auto", help="of the bodies: auto, " + ", ".join(SOLVERS))
+    run.add_argument("--solver", metavar="NAME", help="of the bodies: auto, " + ", ".join(SOLVERS))
     run.add_argument("--mu", type=float, metavar="X", help="friction coefficient")
     run.add_argument("--force", type=float, metavar="N", help="total normal force")
     run.add_argument("--degree", type=int, metavar="1|2", help="linear or quadratic displacement (the scene's own)")
@@ -65,7 +65,10 @@ def make_parser() -> argparse.ArgumentParser:
         "--accuracy", type=float, metavar="X", help="refine until the quantity's relative error is below X"
     )
     run.add_argument("--quantity", metavar="NAME", help="what --accuracy bounds: " + ", ".join(QUANTITIES))
-    run.add_argument("--tol", type=float, default=1e-8, metavar="T", help="bound on the natural-map residual (1e-8)")
+    run.add_argument("--tol", type=float, metavar="T", help="bound on the natural-map residual (1e-8)")
+    new = commands.add_parser("new", help="write a scene file to start from, an example that runs")
+    new.set_defaults(command=_new)
+    new.add_argument("file", metavar="FILE", help="name of the file, ends in .toml; an existing one is not overwritten")
     bench = commands.add_parser("bench", help="execute the runs of an experiment file")
     bench.set_defaults(command=_bench)
     bench.add_argument("file", metavar="FILE", help="experiment, TOML (see contactopt.benchmark)")
@@ -93,7 +96,7 @@ def make_parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace) -> int:
     from contactopt.runner import run
 
-    out = options.out or f"out/{options.scene}"
+    out = options.out or f"out/{Path(options.scene).stem}"
     changes = {
         name: getattr(options, name)
         for name in ("mu", "force", "degree", "simplices")
@@ -123,9 +126,18 @@ def _run(options: argparse.Namespace) -> int:
     native = s["normal_backend"] == s["tangential_backend"] == NATIVE
     by = f", normal problem by {s['normal_backend']}, tangential by {s['tangential_backend']}"
     print(f"method {s['method']}" + ("" if native else by))
-    approach = "none (no plate)" if s["approach"] is None else f"{s['approach']:.6g} mm"
-    print(f"normal force {s['normal_force']:.6g} N, approach {approach}, largest pressure {s['max_pressure']:.6g} MPa")
-    print(f"contact half-width {s['contact_half_width']:.6g} mm, stick half-width {s['stick_half_width']:.6g} mm")
+    length, stress = result.scene.units
+    force = FORCES.get((length, stress), f"{stress} {length}^2")
+    approach = "none (no plate)" if s["approach"] is None else f"{s['approach']:.6g} {length}"
+    print(
+        f"normal force {s['normal_force']:.6g} {force}, approach {approach}, "
+        f"largest pressure {s['max_pressure']:.6g} {stress}"
+    )
+    if s["contact_half_width"] is not None:
+        print(
+            f"contact half-width {s['contact_half_width']:.6g} {length}, "
+            f"stick half-width {s['stick_half_width']:.6g} {length}"
+        )
     if result.estimate is not None:
         _print_estimate(result.estimate)
     print(
@@ -134,6 +146,14 @@ def _run(options: argparse.Namespace) -> int:
     extra = "" if result.path is None else " path.png, history.csv, path.npz,"
     print(f"files in {out}: summary.json, deformed.png, pressure.png,{extra} interface.npz, *.vtu")
     return 0 if result.solution.solved and (result.estimate is None or result.estimate.reached) else 1
+
+
+def _new(options: argparse.Namespace) -> int:
+    from contactopt.scenes.example import write_example
+
+    write_example(Path(options.file))
+    print(f"{options.file} is an example that runs: contactopt run {options.file}")
+    return 0
 
 
 def _print_estimate(estimate: Any) -> None:

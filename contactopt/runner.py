@@ -15,16 +15,19 @@ import numpy as np
 from contactopt.analysis.accuracy import Estimate, refine
 from contactopt.analysis.paths import PathResult, follow
 from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
+from contactopt.analysis.resultants import tables
 from contactopt.analysis.solve_scene import Options, Solved
+from contactopt.analysis.surfaces import contact_fields, on_nodes
 from contactopt.analysis.zone import solve_zone
 from contactopt.errors import InputError
 from contactopt.files import check_folder, whole_folder
 from contactopt.interface.recovery import Fields, recover
 from contactopt.interface.reduction import Reduction
-from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem import InterfaceProblem, Solution, alone, part_of
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
+from contactopt.scenes.scene_files import read_scene_file, with_degree
 from contactopt.solving.methods import default_method, find_method
 
 # What a run writes beside summary.json and one VTU file per body.
@@ -69,16 +72,16 @@ class Result:
 
 
 def run(
-    scene: str | Scene,
+    scene: str | Path | Scene,
     out: str | Path | None = None,
     *,
     method: str | None = None,
     normal: str | None = None,
     tangential: str | None = None,
     preconditioner: str | None = None,
-    Q: str = "auto",
-    solver: str = "auto",
-    tol: float = 1e-8,
+    Q: str | None = None,
+    solver: str | None = None,
+    tol: float | None = None,
     elements: int | None = None,
     accuracy: float | None = None,
     quantity: str | None = None,
@@ -89,32 +92,64 @@ def run(
 
     Parameters
     ----------
-    scene : a name (see contactopt.scenes.SCENES), which is solved along its load path if it has one (PATHS); or a Scene
+    scene : a name (see contactopt.scenes.SCENES), which is solved along its load path if it has one (PATHS); a scene file, whose
+        name ends in .toml; or a Scene
     out : folder for the files; None: nothing is written
     method, normal, tangential : names; by default `auto`, or `alternating` if a backend is named
     preconditioner : a name in contactopt.solving.preconditioners, of methods that take products with Q; it selects
         Q = 'implicit'
-    Q, solver : form of Q and solver of the bodies, see reduce()
-    tol : bound on the natural-map residual
+    Q, solver : form of Q and solver of the bodies, see reduce(); 'auto' by default
+    tol : bound on the natural-map residual; 1e-8 by default
     elements : across the contact half-width
     accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
         sentence in `Result.estimate` says why not; `elements` only scales the first mesh
     quantity : a name in contactopt.analysis.quantities.QUANTITIES
+        All arguments from `method` to here may stand in a scene file; those given here win.
     note : receives progress messages
     changes : to the arguments of a named scene, or to the fields of a Scene
+
+    Returns
+    -------
+    Result : the solution with its interface problem, the fields of the bodies, and a summary
 
     Raises
     ------
     InputError : on input that cannot be used, with a sentence that says what to do; nothing is left half-written
     """
     start = time.perf_counter()
-    states = _states(scene, changes | ({} if elements is None else {"elements": elements}))
+    file = None if isinstance(scene, Scene) or not str(scene).endswith(".toml") else read_scene_file(scene)
+    told = {} if file is None else file.solve
+
+    def choose(key: str, value: Any, usual: Any = None) -> Any:
+        return told.get(key, usual) if value is None else value
+
+    changes |= {} if elements is None else {"elements": elements}
+    states = _states(scene, changes) if file is None else with_degree(file, changes)
     names = {"normal": normal, "tangential": tangential, "preconditioner": preconditioner}
-    given = {key: name for key, name in names.items() if name is not None}
-    method = method or default_method(given)
+    given = {key: choose(key, name) for key, name in names.items() if choose(key, name) is not None}
+    method = choose("method", method) or default_method(given)
+    accuracy, quantity = choose("accuracy", accuracy), choose("quantity", quantity)
     chosen = find_method(method, **given)
     backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
-    options = Options(_form(Q, preconditioner), solver, chosen, tol, note=note)
+    form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
+    options = Options(form, choose("solver", solver, "auto"), chosen, choose("tol", tol, 1e-8), note=note)
+    try:
+        return _finish(states, out, method, backends, options, accuracy, quantity, start)
+    except InputError as error:
+        raise error if file is None else file.located(error) from error
+
+
+def _finish(
+    states: tuple[Scene, ...],
+    out: str | Path | None,
+    method: str,
+    backends: tuple[str, str],
+    options: Options,
+    accuracy: float | None,
+    quantity: str | None,
+    start: float,
+) -> Result:
+    """Solve the states, and write figures and files; `start` is when the clock began."""
     if out is not None:
         check_folder(Path(out))
     solved, path, estimate = _solve(states, accuracy, quantity, options)
@@ -127,7 +162,7 @@ def run(
     )
     if out is None:
         return replace(made, summary=summary | _seconds(seconds, start))
-    note("drawing figures, writing files")
+    options.note("drawing figures, writing files")
     with whole_folder(out, _earlier_files(Path(out))) as folder:
         with _clock(seconds, "figures"):
             _draw(made, folder)
@@ -138,7 +173,7 @@ def run(
     return made
 
 
-def _states(scene: str | Scene, changes: dict[str, Any]) -> tuple[Scene, ...]:
+def _states(scene: Any, changes: dict[str, Any]) -> tuple[Scene, ...]:
     """The scene, or the states of its load path."""
     if isinstance(scene, str):
         return make_path(scene, **changes) if scene in PATHS else (make_scene(scene, **changes),)
@@ -177,6 +212,8 @@ def _summary(
     """What is known of the answer but for the seconds: half-widths and pressure are the quantities that accuracy bounds."""
     reduction, solution = solved.reduction, solved.solution
     problem, r = reduction.problem, solution.reactions
+    found = tables(reduction, solution)
+    single = len(problem.pairs) == 1
     summary: dict[str, Any] = {
         "scene": reduction.scene.name,
         "dofs": reduction.dofs,
@@ -190,15 +227,17 @@ def _summary(
         "outer_iterations": solution.iterations,
         "normal_force": float(r[:, 0].sum()),
         "approach": approach(problem, solution),
-        "contact_half_width": width(reduction, solution),
-        "stick_half_width": stick_width(reduction, solution)[0],
-        "max_pressure": float((r[:, 0] / problem.areas).max()),
-        "pressure": peak_pressure(reduction, solution),
+        "contact_half_width": width(reduction, solution) if single else None,
+        "stick_half_width": stick_width(reduction, solution)[0] if single else None,
+        "max_pressure": max(pair["max_pressure"] for pair in found["pairs"].values()),
+        "pressure": peak_pressure(reduction, solution) if single else None,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
+        **found,
     }
     if path is not None:
-        summary |= {"states": len(path.states)} | {key: float(path.history[key][-1]) for key in PATH_KEYS}
+        keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]
+        summary |= {"states": len(path.states)} | {key: float(path.history[key][-1]) for key in keys}
     if estimate is not None:
         summary["accuracy"] = asdict(estimate)
     return summary
@@ -222,9 +261,12 @@ def _seconds(seconds: dict[str, float], start: float) -> dict[str, Any]:
 def _draw(result: Result, folder: Path) -> None:
     from contactopt import plots
 
-    picture = plots.deformed(result.scene, result.problem, result.fields)
+    problem, solution = result.problem, result.solution
+    picture = plots.deformed(result.scene, part_of(problem, problem.pairs[0]), result.fields)
     picture.figure.savefig(folder / "deformed.png", dpi=130)
-    plots.contact_figure(result.scene, result.problem, result.solution).savefig(folder / "pressure.png", dpi=130)
+    for pair in problem.pairs:
+        name = "pressure" if len(problem.pairs) == 1 else f"pressure-{pair.name}"
+        plots.contact_figure(result.scene, *alone(problem, solution, pair)).savefig(folder / f"{name}.png", dpi=130)
     if result.path is not None:
         from contactopt.figures.animation import path_figure
 
@@ -232,10 +274,14 @@ def _draw(result: Result, folder: Path) -> None:
 
 
 def _write(result: Result, folder: Path) -> None:
-    for fields in result.fields:
+    surfaces = contact_fields(result.reduction, result.solution)
+    for fields in on_nodes(result.reduction, result.fields, surfaces):
         fields.write_vtu(folder / f"{fields.name}.vtu")
+    for surface in surfaces:
+        surface.write_vtu(folder / f"contact-{surface.name}.vtu")
     problem, r = result.problem, result.solution.reactions
-    x = problem.chart.places.T if problem.dim == 3 else problem.chart.places[0]
+    places = np.concatenate([pair.chart.places for pair in problem.pairs], axis=1)
+    x = places.T if problem.dim == 3 else places[0]
     np.savez(
         folder / "interface.npz",
         x=x,  # along the contact surface
@@ -252,13 +298,17 @@ def _write(result: Result, folder: Path) -> None:
 def _earlier_files(folder: Path) -> set[str]:
     """Names of the files that an earlier `contactopt run` wrote into the folder; empty where none has run.
 
-    A folder in which one has run holds its summary.json. Its other files have fixed names, but for one VTU file per body:
-    those are told from other people's by the field von_mises in them.
+    A folder in which one has run holds its summary.json. Its other files have fixed names, but for a VTU file per body and
+    per pair of surfaces, told from other people's by the fields in them, and pictures of the pairs that the summary names.
     """
     with suppress(OSError, ValueError, TypeError):
-        if "contact_nodes" in json.loads(_plain_text(folder / "summary.json")):
-            fields = {file.name for file in folder.glob("*.vtu") if '"von_mises"' in _plain_text(file)}
-            return fields | {name for name in RUN_FILES if (folder / name).exists()}
+        summary = json.loads(_plain_text(folder / "summary.json"))
+        if "contact_nodes" in summary:
+            marks = ('"von_mises"', '"contact_pressure"')
+            found = {file.name for file in folder.glob("*.vtu") if any(mark in _plain_text(file) for mark in marks)}
+            pictures = {f"pressure-{pair}.png" for pair in summary.get("pairs", {})}
+            found |= {file.name for file in folder.glob("pressure-*.png") if file.name in pictures}
+            return found | {name for name in RUN_FILES if (folder / name).exists()}
     return set()
 
 

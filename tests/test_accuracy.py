@@ -7,7 +7,7 @@ from conftest import two_blocks
 from skfem import MeshQuad
 
 from contactopt import InputError, cli, run, scenes, solve
-from contactopt.analysis.accuracy import LARGEST, refine, remainder
+from contactopt.analysis.accuracy import MOST_UNKNOWNS, refine, remainder
 from contactopt.analysis.quantities import QUANTITIES, at_rim, peak_pressure
 from contactopt.analysis.zone import solve_zone
 from contactopt.bodies.refinement import split
@@ -136,7 +136,7 @@ def test_a_quantity_that_does_not_converge_is_given_up(monkeypatch):
 
 
 def test_a_limit_on_unknowns(monkeypatch):
-    monkeypatch.setitem(LARGEST, 2, 3000)
+    monkeypatch.setitem(MOST_UNKNOWNS, 2, 3000)
     solved, estimate = refine([punch()], "energy", 1e-6)
     assert not estimate.reached and "unknowns, more than 3,000" in estimate.message
     assert solved.reduction.dofs <= 3000 and estimate.error > 1e-6

@@ -70,27 +70,57 @@ def test_only_dundurs_constants_count(mu):
     assert (one.exponent, one.oscillation) == pytest.approx((two.exponent, two.oscillation), abs=1e-9)
 
 
+def potentials(exponent: float, theta: float, nu: float) -> np.ndarray:
+    """(sigma_tt, sigma_rt, u_r, u_t) at r = 1 of a unit shear modulus, for phi = a z^lambda, psi = b z^lambda.
+
+    Kolosov and Muskhelishvili: sigma_tt + i sigma_rt = 2 Re phi' + e^(2 i theta) (conj(z) phi'' + psi'),
+    2 (u_r + i u_t) = e^(-i theta) (kappa phi - z conj(phi') - conj(psi)). Columns: real and imaginary a, then b.
+    """
+    kappa, columns = 3 - 4 * nu, []
+
+    def power(p):  # z^p on the ray, beyond the principal branch too
+        return np.exp(1j * p * theta)
+
+    for a, b in ((1, 0), (1j, 0), (0, 1), (0, 1j)):
+        first = exponent * a * power(exponent - 1)
+        second = exponent * (exponent - 1) * a * power(exponent - 2)
+        stress = 2 * first.real + power(2) * (power(-1) * second + exponent * b * power(exponent - 1))
+        moved = (kappa * a * power(exponent) - power(1) * np.conj(first) - np.conj(b * power(exponent))) * power(-1) / 2
+        columns.append([stress.real, stress.imag, moved.real, moved.imag])
+    return np.array(columns).T
+
+
 @pytest.mark.parametrize("mu", [0.0, 0.4, -0.4, None])
 def test_no_root_is_missed(mu):
-    """The first sign change of the determinant on a fine grid, for many materials and angles."""
-    from contactopt.analytic.corner import _conditions
-
+    """Against another formulation, complex potentials: the first sign change of its determinant, many materials and angles."""
     random, grid = np.random.default_rng(1), np.linspace(0.02, 0.999, 400)
+    singular = 0
     for _ in range(25):
         bodies = Material(10 ** random.uniform(-2, 2), random.uniform(0, 0.49)), Material(1.0, random.uniform(0, 0.49))
         angles = tuple(random.uniform(0.3, 6.0, 2))
 
-        def determinant(s, case=(bodies, mu, angles)):
-            return np.linalg.det(_conditions(s, *case))
+        def determinant(s, bodies=bodies, angles=angles):
+            upper, lower = (potentials(s, 0.0, body.nu) for body in bodies)
+            for fields, body in ((upper, bodies[0]), (lower, bodies[1])):
+                fields[2:] *= 2 * (1 + body.nu) / body.E
+            both, none = np.hstack([upper, -lower]), np.zeros((2, 4))
+            free = [
+                np.hstack([potentials(s, angles[0], bodies[0].nu)[:2], none]),
+                np.hstack([none, potentials(s, -angles[1], bodies[1].nu)[:2]]),
+            ]
+            meet = both if mu is None else [*both[:2], both[3], np.append(np.zeros(4), lower[1] - mu * lower[0])]
+            return np.linalg.det(np.vstack([*free, meet]))
 
         signs = np.sign([determinant(s) for s in grid])
         change = np.flatnonzero(signs[1:] != signs[:-1])
         first = brentq(determinant, grid[change[0]], grid[change[0] + 1]) if len(change) else 1.0
         found = corner(*bodies, mu, angles)
+        singular += first < 1
         if found.oscillation:
             assert found.exponent <= first
         else:
             assert found.exponent == pytest.approx(first, abs=1e-8)
+    assert singular >= 10
 
 
 def test_symmetric_bodies_are_no_corner():

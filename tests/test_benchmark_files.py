@@ -25,7 +25,7 @@ def test_two_bodies_of_one_name():
     from dataclasses import replace
 
     scene = two_blocks("plane-strain")
-    with pytest.raises(InputError, match="both bodies are called"):
+    with pytest.raises(InputError, match="two bodies are named"):
         replace(scene, lower=replace(scene.lower, name="upper"))
 
 

@@ -12,7 +12,7 @@ import pytest
 import contactopt.solving.driver
 from contactopt import InputError, benchmark
 from contactopt.benchmark import figures, tables
-from contactopt.benchmark.figures import _pareto, fitted_exponent
+from contactopt.benchmark.figures import fitted_exponent
 from contactopt.benchmark.report import read_layout
 from contactopt.benchmark.store import COLUMNS
 from contactopt.cli import main
@@ -53,14 +53,19 @@ def test_a_method_that_fails_once_in_its_repeats_has_failed():
     assert "m (0)" in lines(figures.performance_profile(rows))
 
 
-def test_exponents_and_pareto_fronts():
+def test_exponents_of_growth():
     n = np.array([10.0, 20, 40, 80, 160])
     assert abs(fitted_exponent(n, 3e-6 * n**1.5) - 1.5) < 1e-12
     assert np.isnan(fitted_exponent(n[:2], n[:2]))
     late = np.where(n < 40, 1e-2, 1e-5 * n**2)  # a constant cost that hides the power at small sizes
     assert abs(fitted_exponent(n, late) - 2) < 1e-12
-    points = np.array([[1, 5], [2, 3], [3, 4], [4, 1], [1, 6]])
-    np.testing.assert_array_equal(_pareto(points), [[1, 5], [2, 3], [4, 1]])
+
+
+def test_the_pareto_front_is_drawn_through_what_nothing_beats():
+    points = np.array([[1, 5], [2, 3], [3, 4], [3.5, 3.5], [4, 1], [1, 6]])
+    rows = table(method=list("abcdef"), solve_seconds=points[:, 0], residual=1e-8 * points[:, 1])
+    front = lines(figures.speed_accuracy(rows))["Pareto front"]
+    np.testing.assert_allclose(front * [1, 1e8], [[1, 5], [2, 3], [4, 1]])
 
 
 def test_time_table_counts_failures_at_the_time_limit():

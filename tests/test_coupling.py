@@ -105,7 +105,7 @@ def test_partners_half_a_sector_off_are_refused():
     scene = turned.pin_in_bush(clearance=0.5, sectors=40)
     wrong = turned.moved(scene, turned.turn(180 / 40)).upper
     with pytest.raises(InputError, match=r"interface nodes do not match.*lies .* off the normal.*same nodes"):
-        reduce(replace(scene, upper=wrong))
+        reduce_bodies(replace(scene, upper=wrong), coupling="matching")
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -176,9 +176,9 @@ def test_friction_may_be_a_function_of_the_place():
             reduce(replace(scene, mu=wrong))
 
 
-def lifted(scene, upper, lower) -> Coupling:
+def lifted(scene, pair, upper, lower) -> Coupling:
     """A kind of coupling that someone adds: matching nodes, one unit of length further apart."""
-    plain = coupling.couple(scene, upper, lower)
+    plain = coupling.couple(scene, pair, upper, lower)
     return replace(plain, gap=plain.gap + 1.0)
 
 
@@ -187,8 +187,8 @@ def test_a_coupling_is_added_by_one_line(monkeypatch):
     scene = two_blocks("plane-strain")
     plain, raised = reduce_bodies(scene), reduce_bodies(scene, coupling="lifted")
     assert np.allclose(raised.problem.q[:, 0], plain.problem.q[:, 0] + 1.0)
-    with pytest.raises(InputError, match="unknown coupling 'mortar'; choose from matching"):
-        reduce_bodies(scene, coupling="mortar")
+    with pytest.raises(InputError, match="unknown coupling 'glue'; choose from auto, matching"):
+        reduce_bodies(scene, coupling="glue")
 
 
 @dataclass(frozen=True)

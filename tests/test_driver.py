@@ -27,7 +27,7 @@ class Scripted:
 
 PROBLEM = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.5)  # solved by r = (1, 0)
 WRONG = [(0.5 + 0.01 * i, 0.0) for i in range(50)]
-FORCE = np.sqrt(0.5)  # the unit of force of the dimensionless problem
+FORCE = 1.0  # the unit of force of the dimensionless problem
 
 
 def test_solved_is_the_certificates_word():

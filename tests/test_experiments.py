@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -101,3 +102,19 @@ def test_the_picture_of_the_readme_shows_what_its_caption_says():
 def test_questions_stand_in_their_folder():
     files = {path.name for path in (ROOT / "experiments").glob("*.py")}
     assert files == {"__init__.py", "report.py"}, "move the question to experiments/questions/"
+
+
+def test_every_command_that_is_named_somewhere_exists():
+    files = [
+        ROOT / "README.md",
+        *ROOT.glob("contactopt/**/*.py"),
+        *ROOT.glob("reports/**/*.md"),
+        *ROOT.glob("docs/**/*.md"),
+    ]
+    named = {
+        (match[1], str(path.relative_to(ROOT)))
+        for path in files
+        for match in re.finditer(r"python -m\s+(experiments(?:\.\w+)+)", path.read_text(encoding="utf-8"))
+    }
+    assert len(named) > 5
+    assert not [(module, path) for module, path in sorted(named) if find_spec(module) is None]

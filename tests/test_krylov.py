@@ -67,7 +67,7 @@ def test_estimated_diagonal_is_near_the_true_one_and_zero_where_nothing_moves(na
 
 def test_trace_of_a_diagonal_operator_is_exact():
     d = np.array([1.0, 2.0, 3.0, 0.0])
-    estimate = estimate_diagonal(lambda X, accuracy: d[:, None] * X, np.ones(2), d > 0)
+    estimate = estimate_diagonal(lambda X, accuracy: d[:, None] * X, [np.ones(2)], d > 0)
     assert estimate.sum() == pytest.approx(6.0) and estimate[3] == 0
 
 

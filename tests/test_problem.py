@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from conftest import one_contact
 
-from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
+from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, siconos_residual, solve
 from contactopt.problem import balance_residual, dimensionless, fit_multipliers
 from contactopt.problem.laws.bilateral import Bilateral
 
@@ -39,7 +39,7 @@ def test_rho_one_is_the_published_formula():
             p = np.array([h, *(0.5 * h * x[1:] / t)])
         error[i] = r[i] - p
     size = max(np.linalg.norm(r), np.linalg.norm(problem.q), np.linalg.norm(u))
-    assert natural_map_residual(problem, r, rho=1.0) == pytest.approx(np.linalg.norm(error) / size, rel=1e-12)
+    assert siconos_residual(problem, r) == pytest.approx(np.linalg.norm(error) / size, rel=1e-12)
 
 
 @pytest.mark.parametrize("force,length", [(1e6, 1e-3), (1e-9, 1e3), (1.0, 1e-9)])
@@ -81,7 +81,7 @@ def test_bilateral_contact_carries_tension_and_its_friction():
 def test_balance_counts(punch):
     r = solve(punch, tol=1e-10).reactions.copy()
     r[:, 0] *= 1.01
-    assert balance_residual(punch, r) == pytest.approx(0.01 / 2.01, rel=1e-6)
+    assert balance_residual(punch, r) == pytest.approx(0.01, rel=1e-6)  # of the plate's force
     assert natural_map_residual(punch, r) >= balance_residual(punch, r)
 
 
@@ -107,7 +107,6 @@ def test_reactions_that_are_not_finite(punch):
         (dict(law=[-0.1]), "must not be negative"),
         (dict(law=[np.nan]), "not finite"),
         (dict(Q=np.eye(3)), "Q must have shape"),
-        (dict(Q=np.array([[1.0, 0.5], [0.0, 1.0]])), "symmetric"),
         (dict(q=np.zeros((1, 4))), "2 or 3 columns"),
         (dict(s=np.ones(1)), "V must have shape"),
         (dict(V=np.ones((2, 1))), "V has columns but s is empty"),

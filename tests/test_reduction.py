@@ -205,7 +205,7 @@ def test_interface_nodes_that_do_not_match_are_refused(cells, shift, message):
     inner = (mesh.p[0] > 0) & (mesh.p[0] < 1)
     moved = type(mesh)(mesh.p + shift * np.stack([inner, 0 * inner]), mesh.t, _boundaries=mesh.boundaries)
     with pytest.raises(InputError, match=f"interface nodes do not match.*{message}.*same nodes"):
-        reduce(replace(base, lower=replace(base.lower, mesh=moved)))
+        reduce_bodies(replace(base, lower=replace(base.lower, mesh=moved)), coupling="matching")
 
 
 def test_rigid_gap_must_be_finite():
@@ -215,7 +215,7 @@ def test_rigid_gap_must_be_finite():
 
 
 def test_two_rigid_bodies_are_refused():
-    with pytest.raises(InputError, match="both bodies are rigid"):
+    with pytest.raises(InputError, match=r"both bodies of contact .* are rigid"):
         Scene("s", Rigid("a"), Rigid("b"), 0.1)
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from contactopt.problem.cones import disc_derivative, half_line_derivative
-from contactopt.solving.kernels.semismooth import crossover
+from contactopt.solving.kernels.semismooth import Equations, crossover
 
 
 def spd(n, seed=0):
@@ -42,9 +42,28 @@ def test_a_rough_tangential_force_becomes_exact(d):
     assert np.allclose(r, exact, atol=1e-12)
 
 
-def test_it_never_makes_an_answer_worse():
-    """A singular system must not replace a good answer."""
-    Q, c = np.zeros((2, 2)), np.zeros(2)
-    start = np.array([[1.0], [2.0]])
-    r, _ = crossover(Q, c, np.zeros((2, 0)), np.zeros(0), half_line_derivative, start, np.zeros(0))
-    assert np.array_equal(r, start)
+@pytest.mark.parametrize("seed", range(6))
+def test_it_never_makes_an_answer_worse(seed):
+    """The first Newton step leads far away from a good start; cut off there, the start must come back."""
+    rng, none = np.random.default_rng(seed), np.zeros(0)
+    A = rng.normal(size=(12, 3))
+    Q, c, V = A @ A.T + 1e-6 * np.eye(12), rng.normal(size=12), np.zeros((12, 0))
+    equations = Equations(Q, c[:, None], V, none, half_line_derivative)
+    start = np.maximum(0.0, rng.normal(size=(12, 1)))
+    before, error, balance, D = equations.evaluate(start, none)
+    change = equations.step(error, balance, D)
+    assert change is not None and equations.evaluate(start + change[0], none)[0] > 10 * before
+    for steps in (2, 3, 5, 20):
+        r, lam = crossover(Q, c, V, none, half_line_derivative, start, none, steps)
+        assert equations.evaluate(r, lam)[0] <= before
+    assert equations.evaluate(r, lam)[0] < 1e-8 * before  # with steps enough it is better
+
+
+def test_a_singular_system_has_no_newton_step():
+    """Two plates that move alike: their multipliers are not unique, and nothing that is not finite may come out."""
+    V, s, start = np.ones((3, 2)), -np.ones(2), np.ones((3, 1))
+    equations = Equations(np.eye(3), np.zeros((3, 1)), V, s, half_line_derivative)
+    _, error, balance, D = equations.evaluate(start, np.zeros(2))
+    assert equations.step(error, balance, D) is None
+    r, lam = crossover(np.eye(3), np.zeros(3), V, s, half_line_derivative, start, np.zeros(2))
+    assert np.array_equal(r, start) and np.array_equal(lam, np.zeros(2))

@@ -50,7 +50,7 @@ def dragged() -> InterfaceProblem:
 def test_more_friction_needs_more_iterations(dragged, mu, iterations):
     """Numbers of an independent prototype on a block of these proportions, to 1e-8."""
     solution = solve(replace(dragged, law=mu), Tresca(), tol=1e-8)
-    assert solution.solved and abs(solution.iterations - iterations) <= 2
+    assert solution.solved and abs(solution.iterations - iterations) <= max(2, 0.1 * iterations)
 
 
 def test_too_much_friction_for_a_fixed_point_is_none_for_newton(dragged):

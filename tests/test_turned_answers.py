@@ -33,6 +33,11 @@ def plain():
     return {name: solve_scene(make(), options=OPTIONS) for name, make in SCENES.items()}
 
 
+def products_to(residual: float, solution) -> float:
+    """Products with Q until the certificate is below `residual`: closer to rounding, rounding decides on one more step."""
+    return next(step["products"] for step in solution.history if step["residual"] <= residual)
+
+
 @pytest.mark.parametrize("name,_,R", MOVES, ids=[f"{name}-{how}" for name, how, _ in MOVES])
 def test_a_turned_scene_has_the_same_answer(plain, name, _, R):
     a, b = plain[name], solve_scene(turned.moved(SCENES[name](), R), options=OPTIONS)
@@ -45,7 +50,8 @@ def test_a_turned_scene_has_the_same_answer(plain, name, _, R):
     assert np.abs(np.linalg.norm(r[:, 1:], axis=1) - np.linalg.norm(t[:, 1:], axis=1)).max() < 1e-8 * scale
     for mask, other in zip(vars(contact_status(p, r)).values(), vars(contact_status(q, b.solution.reactions)).values()):
         assert np.array_equal(mask, other[own])
-    assert abs(a.solution.products - b.solution.products) <= 0.1 * a.solution.products
+    work, other_work = (products_to(1e-8, s.solution) for s in (a, b))
+    assert abs(work - other_work) <= 0.1 * work
     for read in (contact_edge, lambda *given: stick_edge(*given)[0]):
         value = read(a.reduction.scene, p, r)
         assert value > 0 and read(b.reduction.scene, q, b.solution.reactions) == pytest.approx(value, rel=1e-8)

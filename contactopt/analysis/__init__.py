@@ -1,0 +1,1 @@
+"""What is asked of scenes: solving them, finding their contact zones, reading quantities, following load paths."""

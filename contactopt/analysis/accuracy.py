@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.constants import BELOW, FIRST, LARGEST, SLOWEST, STUCK
+from contactopt.analysis.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
 from contactopt.analysis.paths import PathResult, follow
 from contactopt.analysis.quantities import QUANTITIES, at_rim, uncertainty
 from contactopt.analysis.solve_scene import Options, Solved
@@ -45,7 +45,15 @@ EDGES = ("width", "stick")
 
 @dataclass(frozen=True)
 class Level:
-    """One solve. `zone`: half-width that the mesh resolves [length], None without a zone loop; `uncertainty` of the value."""
+    """What one solve of the search gave.
+
+    elements     across the contact half-width;   splits  how often the mesh was halved everywhere
+    unknowns     of the displacement;   contacts  of the interface problem
+    rounds       of the zone loop
+    zone         half-width that the mesh resolves [length]; None without a zone loop
+    value        of the quantity [its unit];   uncertainty  of its reading [its unit]
+    seconds      wall time [s]
+    """
 
     elements: int
     splits: int
@@ -62,10 +70,15 @@ class Level:
 class Estimate:
     """What is known of a quantity after the last solve.
 
-    value         on the last mesh;  extrapolated: less the estimated error
-    error         estimated, relative to the value: mesh_error and grading_error, signed; at least the uncertainty; None: unknown
-    order         observed of the first part, None if the sequence is not monotone
-    reached       whether error <= target;  message: one sentence;  levels: in the order they were solved
+    value          on the last mesh [unit of the quantity]
+    extrapolated   the value less its estimated error; None where the error is unknown
+    error          estimated error over the value [-], at least the uncertainty of the reading; None where it is unknown
+    mesh_error     signed part of it that falls with the number of elements [-]
+    grading_error  signed part of it that falls with the number of splits [-]
+    order          observed order of the first part; None if the sequence is not monotone
+    reached        whether the error is at most the target
+    message        one sentence that says how the search ended
+    levels         all solves, in their order
     """
 
     quantity: str
@@ -111,7 +124,7 @@ def refine(
     """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
 
     It ends short of the target, with a sentence in the estimate, where the quantity does not converge, where the next mesh
-    would have more than LARGEST unknowns, or where a solve fails.
+    would have more than MOST_UNKNOWNS unknowns, or where a solve fails.
 
     Parameters
     ----------
@@ -155,11 +168,20 @@ def refine(
 
 
 def remainder(before: float | None, last: float, best: float) -> tuple[float, float | None]:
-    """Sum of all further differences of a sequence under halving, and its order, None if unknown.
+    """Estimate how much a sequence still changes under further halving of the mesh.
 
-    before, last  its last two differences: the order is log2(before / last), held within SLOWEST and `best`. Never
-    less than what `best` leaves of the difference before, since a small last one may be luck; where the two have
-    opposite signs the remainder is as large as the last difference, or a quarter of the one before.
+    The order is log2(before / last), held between SLOWEST and `best`, and the remaining differences form a geometric series.
+    A small last difference may be luck, so that the result is at least what order `best` leaves of the difference before.
+    Where the two differences have opposite signs, the result is as large as the last one, or a quarter of the one before.
+
+    Parameters
+    ----------
+    before, last : the last two differences of the sequence; `before` is None where there is only one
+    best : the largest order that is believed
+
+    Returns
+    -------
+    The sum of all further differences, with the sign of the last one, and the observed order, None if it is unknown.
     """
     order = None
     size = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1)
@@ -175,7 +197,8 @@ class _Search:
     """The nested solves and what they say. The last of `meshes`, with `splits`, is the mesh in question.
 
     meshes   levels of the main sequence: doubled elements without splits, or, where the meshes are given, splits alone
-    changes  of the value by the first split, the second, ...: those of the present splits, and at least one
+    changes  changes[i] is the change of the value by split i + 1. There is one entry for every split of the present mesh;
+             without a split there is still the first one, which was measured to learn what splits would do
     share    by which the first split multiplies the unknowns
     """
 
@@ -198,7 +221,7 @@ class _Search:
             self._split(1, self.meshes[-1].elements)
 
     def mesh_error(self) -> tuple[float, float | None]:
-        """Of the value on the last mesh, signed [unit of the quantity], and its order; infinite for a single mesh."""
+        """Signed error of the value on the last mesh [unit of the quantity], infinite for a single mesh; and its order."""
         steps = np.diff([level.value for level in self.meshes[-3:]])
         if not len(steps):
             return np.inf, None
@@ -206,7 +229,7 @@ class _Search:
         return -rest, order
 
     def grading_error(self) -> float:
-        """Of the meshes with the present splits, signed."""
+        """Signed error that comes from the sizes of the elements away from the contact, with the present splits."""
         if not self.changes:
             return 0.0
         before = self.changes[-2] if len(self.changes) > 1 else None
@@ -214,7 +237,7 @@ class _Search:
         return -rest - sum(self.changes[self.splits :])
 
     def obstacle(self) -> str:
-        """Why it would be in vain to go on, or nothing."""
+        """One sentence that says why further refinement would be in vain, or an empty text."""
         assert self.last is not None
         if self.last.failure:
             return self.last.failure
@@ -226,7 +249,7 @@ class _Search:
         return ""
 
     def finer_mesh(self) -> str:
-        """Refine the last mesh; or the reason not to."""
+        """Refine the last mesh and return an empty text, or return the reason why not."""
         counts = [level.unknowns for level in self.meshes[-2:]]
         growth = counts[1] / counts[0] if len(counts) > 1 else 2.0 ** self.states[-1].dim
         if reason := self._too_large(growth, self.splits):
@@ -235,7 +258,7 @@ class _Search:
         return ""
 
     def finer_grading(self) -> str:
-        """One split more; or the reason not to."""
+        """Add one split and return an empty text, or return the reason why not."""
         elements = self.meshes[-1].elements
         if 2 ** (self.splits + 1) * self.first > elements:  # would start from a mesh coarser than the first
             return self.finer_mesh()
@@ -258,9 +281,9 @@ class _Search:
         """A sentence if the next mesh passes the limit."""
         dim = self.states[-1].dim
         unknowns = growth * self.meshes[-1].unknowns * self.share**splits
-        if unknowns <= LARGEST[dim]:
+        if unknowns <= MOST_UNKNOWNS[dim]:
             return ""
-        return f"to go on would take up to {unknowns:.2g} unknowns, more than {LARGEST[dim]:,}"
+        return f"to go on would take up to {unknowns:.2g} unknowns, more than {MOST_UNKNOWNS[dim]:,}"
 
     def _refine_mesh(self) -> None:
         i = len(self.meshes)

@@ -1,13 +1,13 @@
 """The chosen numbers of this room, all of them, and the commands that show what they are worth.
 
-`python -m experiments.accuracy` measures readings and error estimates against exact solutions, `python -m
-experiments.cost_ratio` what the start from a coarse mesh saves.
+`python -m experiments.questions.accuracy` measures readings and error estimates against exact solutions.
+`python -m experiments.questions.cost_ratio` measures what the start from a coarse mesh saves.
 """
 
 # Reading edges and peaks (contactopt.analysis.edges, contactopt.analysis.quantities).
 SMOOTH = 3, 6  # rings of nodes left out and fitted where contact ends by itself: the outermost carry most of the error
 NEAR = 1, 2  # the same where the values are straight only next to the edge
-INNER = 0.0, 0.5  # shares of the half-width from which on the squared pressure on a line is fitted, in turn
+INNER = 0.3  # share of the half-width from which on the squared pressure on a line is fitted
 OUTER = 2  # nodes next to the edge of contact that this fit leaves out
 WINDOW = 0.5  # share of the distance from the largest pressure to the edge over which the peak is fitted
 
@@ -23,6 +23,6 @@ ROUGH = 1e-6  # certificate asked of a coarse mesh: its own error is larger
 # Refinement (contactopt.analysis.accuracy).
 FIRST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least, by dimension
 BELOW = 8  # by how much fewer than the scene's default they are
-LARGEST = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about a gigabyte and half a minute
+MOST_UNKNOWNS = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about a gigabyte and half a minute
 SLOWEST = 0.75  # least order that is believed: slower ones were noise wherever the exact value was known
 STUCK = 0.1  # order below which a sequence does not converge

@@ -60,7 +60,11 @@ REAL, ZERO = 1e-7, 1e-10  # an eigenvalue with relatively less imaginary part is
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Values of the largest mu (all scaled together) below which there is one solution, or an iteration contracts."""
+    """Bounds of the largest friction coefficient, all coefficients scaled together [-].
+
+    unique       below it there is one solution
+    tresca       below it the Tresca iteration contracts;   alternating  below it the alternating iteration contracts
+    """
 
     unique: float
     tresca: float
@@ -142,9 +146,21 @@ class Diagnosis:
 
 
 def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Diagnosis:
-    """What the compliance says before solving, and with a certified `solution` what its slip map says near it.
+    """Say what is known of a problem before it is solved and, given a solution, of the iterations near it.
 
-    Raises InputError for laws without a friction coefficient, if the solution does not solve this problem, or if its load pulls the bodies apart.
+    Parameters
+    ----------
+    problem : with Coulomb's law or bilateral contact
+    solution : of this problem; None: `Diagnosis.local` stays empty
+
+    Returns
+    -------
+    Diagnosis : rank of Q, thresholds of the friction coefficient, tightness of the convex relaxation
+
+    Raises
+    ------
+    InputError : for laws without a friction coefficient, if the solution does not solve this problem, or if the load pulls
+        the bodies apart
     """
     if not problem.law.proportional or problem.law.dilatant:
         raise InputError(

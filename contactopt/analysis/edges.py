@@ -45,9 +45,8 @@ def contact_area(scene: Scene, half_width: float) -> float:
 def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
     """Half-width of the contact zone [length].
 
-    Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against x^2 over the whole
-    half-width, without the last two nodes, weighted by the nodal areas. Where that zero is not next to the last node, the
-    parabola goes through the outer half only. On a surface, where fewer than three nodes are left, and where the other end
+    Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against x^2 over the outer
+    part of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than three nodes are left, and where the other end
     is a corner, a straight line goes through the rings of nodes next to the edge. Where every node touches, or where
     contact ends at a corner, the edge is that of the contact surface.
 
@@ -59,10 +58,8 @@ def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
     pressure = reactions[:, 0] / problem.areas
 
     def read(end: End) -> list[float]:
-        for share in INNER if problem.dim == 2 and end.free else ():
-            edge = _zero_of_parabola(end, pressure, problem.areas, share)
-            if edge is not None and end.clip(edge) == edge:
-                return [edge]
+        if problem.dim == 2 and end.free and (edge := _zero_of_parabola(end, pressure, problem.areas)) is not None:
+            return [edge]
         edge = end.inner(pressure, SMOOTH)
         return [] if edge is None else [end.clip(edge)]
 
@@ -132,15 +129,15 @@ def _half_width(
     return sum(patch.copies * (patch.last - patch.first) / 2 for patch in ends), uncertainty
 
 
-def _zero_of_parabola(end: End, pressure: np.ndarray, areas: np.ndarray, share: float) -> float | None:
-    """Where a parabola through p^2 over x^2, from that share of the half-width on, is first zero; None if it is not.
+def _zero_of_parabola(end: End, pressure: np.ndarray, areas: np.ndarray) -> float | None:
+    """Where a parabola through p^2 over x^2, over the outer part of the half-width, is first zero; None if it is not.
 
     With friction between dissimilar bodies p^2 is not straight over x^2, hence the parabola. Three nodes leave a line.
     """
     x, inside = end.distance, end.inside
     last = x[inside].max()
     innermost = np.sort(x[inside])[-OUTER:].min()
-    fitted = inside & (x >= share * last) & (x < innermost)
+    fitted = inside & (x >= INNER * last) & (x < innermost)
     nodes = len(np.unique(x[fitted]))
     if nodes < 3:
         return None

@@ -25,22 +25,34 @@ from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
 from contactopt.problem import InterfaceProblem, Solution, Status, dimensionless, natural_map_residual
 
-LARGEST = 24  # contacts
+MOST_CONTACTS = 24  # contacts
 CERTIFIED = 1e-8  # natural-map residual of a solution
 SAME = 1e-7  # relative size of what counts as zero when a point is given its states
 OPEN, STICK, FORWARD, BACKWARD = range(4)
 
 
 def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]:
-    """Every solution of a 2D Coulomb problem, at most `limit` of them, each certified; [] if there is none.
+    """Find every solution of a small 2D problem with Coulomb's law.
 
-    Raises InputError in 3D, for other laws, for more than 24 contacts, for Q that is not positive definite on the
-    balanced forces and for plates that do not press; BackendError if HiGHS fails.
+    Parameters
+    ----------
+    problem : with at most 24 contacts
+    limit : number of solutions after which the search ends
+
+    Returns
+    -------
+    The solutions, each certified; an empty list if there is none.
+
+    Raises
+    ------
+    InputError : in 3D, for other laws, for more than 24 contacts, for a Q that is not positive definite on the forces that
+        keep the balance, and for plates that do not press
+    BackendError : if the solver HiGHS fails
     """
     check_number("limit", limit, low=0.0)
-    if problem.dim != 2 or not _coulomb(problem) or problem.contacts > LARGEST:
+    if problem.dim != 2 or not _coulomb(problem) or problem.contacts > MOST_CONTACTS:
         raise InputError(
-            f"all_solutions needs a 2D problem of Coulomb's law with at most {LARGEST} contacts; use solve."
+            f"all_solutions needs a 2D problem of Coulomb's law with at most {MOST_CONTACTS} contacts; use solve."
         )
     scaled, scales = dimensionless(problem)
     program, found = _Program(scaled), list[Solution]()

@@ -139,10 +139,22 @@ def follow(
 ) -> PathResult:
     """Solve a load path: the states of one scene in their order, from the unloaded bodies on.
 
-    scenes    that differ in their loads only: forces, tractions, prescribed displacements
-    elements, zone, Q, solver   as for reduce_bodies(): one mesh for the whole path, fine enough for all of its zones
-    settings  go to solve(), where each step starts from the solution of the one before
-    Raises InputError for an empty path or states that are not those of one scene.
+    Parameters
+    ----------
+    scenes : states that differ in their loads only: forces, tractions, prescribed displacements
+    elements : across the contact half-width; the scene's own number by default. One mesh serves the whole path.
+    zone : half-width that the mesh resolves [length]; by default the scene's
+    note : receives one short sentence before every step that takes time
+    Q, solver : form of Q and solver of the bodies, as for reduce()
+    settings : arguments of solve(). Each step starts from the solution of the one before.
+
+    Returns
+    -------
+    PathResult : the states with their solutions, in their order
+
+    Raises
+    ------
+    InputError : for an empty path, or for states that are not those of one scene
     """
     states: list[State] = []
     seconds: Counter[str] = Counter()
@@ -192,7 +204,7 @@ def _step(
     q[:, 1:] -= earlier
     solution = solve(replace(problem, q=q), start=None if before is None else before.solution, **settings)
     now, gap = _mechanics(reduction, solution), np.zeros(q.shape)
-    gap[:, 0] = reduction.coupling.gap
+    gap[:, 0] = reduction.gap
     if last is None:  # the unloaded bodies
         last = _Mechanics(0 * now.r, gap, [0 * U for U in now.U], [0 * F for F in now.F])
     moved = problem.displacements(0 * now.r, solution.multipliers) - gap
@@ -213,14 +225,14 @@ def _step(
 
 def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
     r = state.solution.reactions
-    status = contact_status(problem, r)
+    status, single = contact_status(problem, r), len(problem.pairs) == 1
     return {
         "normal_force": float(r[:, 0].sum()),
         "shear_force": -float(r[:, 1].sum()),
         "approach": -float(state.apart[0]),
         "shift": float(state.apart[1]),
-        "contact_half_width": contact_edge(state.scene, problem, r),
-        "stick_half_width": stick_edge(state.scene, problem, r, state.slip)[0],
+        "contact_half_width": contact_edge(state.scene, problem, r) if single else np.nan,
+        "stick_half_width": stick_edge(state.scene, problem, r, state.slip)[0] if single else np.nan,
         "contact_nodes": int(status.touching.sum()),
         "stick_nodes": int(status.stick.sum()),
         "slip_nodes": int(status.slip.sum()),

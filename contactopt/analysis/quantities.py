@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
-    """By how much the plates bring the bodies together along the mean normal [length]; None without a plate."""
+    """How far the plates bring the bodies together along the mean normal [length]; None without a plate."""
     if len(solution.multipliers) == 0:
         return None
     normal = (problem.V @ solution.multipliers).reshape(problem.q.shape)[:, 0]
@@ -30,7 +30,7 @@ def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
 
 
 def elastic_energy(reduction: Reduction, solution: Solution) -> float:
-    """Of all bodies, the sum of U' A U / 2 [force length]."""
+    """Elastic energy of all bodies together, the sum of U' A U / 2 [force length]."""
     displaced = reduction.displaced(solution.reactions, solution.multipliers)
     return sum(body.energy(U) for body, U in zip(reduction.bodies, displaced))
 
@@ -38,11 +38,12 @@ def elastic_energy(reduction: Reduction, solution: Solution) -> float:
 def peak_pressure(reduction: Reduction, solution: Solution) -> float:
     """Largest value of a smooth pressure [stress].
 
-    p^2, which is quadratic under Hertz's ellipse, is fitted by a polynomial about the node of the largest pressure, up to half-way
-    to the edge, weighted by the nodal areas. That removes the error of the single node: on the axis of an
-    axisymmetric mesh the nodal value is some 1 % low, since the strain u_r / r is poorly resolved there, on a ring
-    whose area counts for nothing. At the rim of the contact surface, and where the window has no room, the nodal value.
+    The square of the pressure is quadratic under Hertz's ellipse. A polynomial is fitted to it about the node of the
+    largest pressure, up to half-way to the edge, weighted by the nodal areas. That removes the error of the single node,
+    which is large on the axis of an axisymmetric mesh: the strain u_r / r is poorly resolved there, on a ring without area.
+    The nodal value itself is returned at the rim of the contact surface, and where the fit has too few nodes.
     """
+    _one_pair(reduction)
     problem = reduction.problem
     local, node, top = _around_the_peak(problem, solution)
     pressure = solution.reactions[:, 0] / problem.areas
@@ -86,15 +87,26 @@ def _around_the_peak(problem: InterfaceProblem, solution: Solution) -> tuple[np.
 
 
 def width(reduction: Reduction, solution: Solution) -> float:
-    """Half-width of the contact zone [length], contact_edge()."""
+    """Half-width of the contact zone [length], as contact_edge() reads it."""
+    _one_pair(reduction)
     return contact_edge(reduction.scene, reduction.problem, solution.reactions)
 
 
 def stick_width(reduction: Reduction, solution: Solution) -> tuple[float, float]:
-    """Half-width of the stick zone and its uncertainty [length], stick_edge() with the slip of this solution."""
+    """Half-width of the stick zone and its uncertainty [length], as stick_edge() reads them from this solution."""
+    _one_pair(reduction)
     problem = reduction.problem
     slip = problem.displacements(solution.reactions, solution.multipliers)[:, 1:]
     return stick_edge(reduction.scene, problem, solution.reactions, slip)
+
+
+def _one_pair(reduction: Reduction) -> None:
+    """InputError if a scene has several pairs of surfaces, each with numbers of its own."""
+    if len(reduction.problem.pairs) > 1:
+        raise InputError(
+            f"scene '{reduction.scene.name}' has {len(reduction.problem.pairs)} pairs of surfaces, each with its own pressure and "
+            "half-widths; ask for the energy, or read them by pair (contactopt.analysis.resultants)."
+        )
 
 
 def stick_ratio(reduction: Reduction, solution: Solution) -> tuple[float, float]:
@@ -112,7 +124,7 @@ def _approach(reduction: Reduction, solution: Solution) -> float:
 
 
 def uncertainty(name: str, reduction: Reduction, solution: Solution) -> float:
-    """Of the value itself, in its unit: nonzero where it is read between nodes, in two ways that may differ."""
+    """Half the difference between two readings of a quantity, in its unit; zero where it has only one reading."""
     return stick_ratio(reduction, solution)[1] if name == "stick" else 0.0
 
 

@@ -21,7 +21,8 @@ def solve_zone(
 
     Each round solves on meshes with a node at the edge of the present zone, starting from the round before, and reads the
     new edge from the reactions. The loop ends when two zones agree to AGREE of an element, when a solve fails, or after LOOPS
-    rounds. A scene without a zone is solved once.
+    rounds. A scene without a zone, or with several pairs of surfaces, is
+    solved once.
 
     Parameters
     ----------
@@ -40,8 +41,8 @@ def solve_zone(
     InputError : if fewer than two nodes are in contact, and as solve_scene()
     """
     elements = scene.elements if elements is None else elements
-    if scene.zone is None:
-        return solve_scene(scene, elements, None, options, start)
+    if scene.zone is None or len(scene.pairs) > 1:
+        return solve_scene(scene, elements, scene.zone, options, start)
     zones = [start.zones[-1] if start is not None and start.zones else scene.zone]
     seconds: Counter[str] = Counter()
     while True:

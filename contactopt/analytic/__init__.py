@@ -4,11 +4,13 @@ reference   the record of a solution; E*, Gs, Dundurs' constants
 normal      Hertz; rigid flat punches, frictionless and bonded
 friction    rigid flat punches and Hertz's geometry with Coulomb friction between dissimilar materials (spence, panels)
 mindlin     Cattaneo-Mindlin: tangential loading, unloading, cyclic loss
+conforming  a pin in a hole with clearance (Persson), the press fit (Lame)
 corner      exponents of the stress at the edge of an elastic punch
 
 Half-spaces are elastic, isotropic, homogeneous; strains and slopes small. Any consistent units.
 """
 
+from contactopt.analytic.conforming import pin_in_hole, press_fit
 from contactopt.analytic.corner import Corner, corner, edge_stick_threshold
 from contactopt.analytic.friction import (
     flat_punch_axisymmetric_friction,
@@ -54,6 +56,8 @@ __all__ = [
     "hertz_point",
     "hertz_point_friction",
     "hertz_point_tangential",
+    "pin_in_hole",
+    "press_fit",
     "stick_ratio",
     "tangential_modulus",
 ]

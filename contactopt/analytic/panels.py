@@ -18,7 +18,7 @@ EVEN, ODD = 1, -1
 ORDER = 12  # nodes per panel; even, so that zero is no node
 RATIO = 0.25  # of neighbouring panels towards the stick limit
 SMALLEST = 1e-5  # panel, relative to min(b, 1)
-LARGEST = 1.5  # panel; the kernels have poles at a distance of pi from the real line
+LARGEST_PANEL = 1.5  # panel; the kernels have poles at a distance of pi from the real line
 TAIL = 16.0  # the grid ends at b + TAIL: with what lies beyond, e^-TAIL is lost
 NEAR = 2.0  # half-lengths from a panel's centre up to which a singular kernel needs the exact rule
 AWAY = 1.2  # half-lengths from which a rule of 40 nodes is exact, while the recurrence for Q_m loses digits
@@ -38,11 +38,11 @@ def panel_edges(b: float) -> np.ndarray:
     while inward[-1] / RATIO < 0.6 * scale:
         inward.append(inward[-1] / RATIO)
     rest = b - inward[-1]
-    count = int(np.ceil(rest / LARGEST + 0.5 - 1e-9))
+    count = int(np.ceil(rest / LARGEST_PANEL + 0.5 - 1e-9))
     equal = rest * (np.arange(count) + 0.5) / (count - 0.5) - b
     outward = [SMALLEST * scale]
     while outward[-1] < TAIL:
-        outward.append(min(outward[-1] / RATIO, outward[-1] + LARGEST))
+        outward.append(min(outward[-1] / RATIO, outward[-1] + LARGEST_PANEL))
     return np.concatenate([equal[:-1], -np.array(inward[::-1]), [0.0], outward])
 
 

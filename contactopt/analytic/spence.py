@@ -23,7 +23,10 @@ from contactopt.analytic.panels import EVEN, LEFT, ODD, ORDER, TRANSFORM, Panels
 from contactopt.analytic.reference import check_beta
 from contactopt.checks import check_number
 
-SMALLEST, LARGEST = 1e-9, 19.5  # artanh(c/a): below, c/a is called zero; above, it is one in double precision
+SMALLEST_ARTANH, LARGEST_ARTANH = (
+    1e-9,
+    19.5,
+)  # artanh(c/a): below, c/a is called zero; above, it is one in double precision
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +45,7 @@ class UnitPunch:
     @property
     def stick_ratio(self) -> float:
         b = self.panels.b
-        return 0.0 if b < 1.01 * SMALLEST else float(np.tanh(b))
+        return 0.0 if b < 1.01 * SMALLEST_ARTANH else float(np.tanh(b))
 
     def pressure(self, v: np.ndarray) -> np.ndarray:
         return self.panels.evaluate(self.p, v, EVEN)
@@ -91,7 +94,7 @@ def unit_punch(mu: float, beta: float, axisymmetric: bool) -> UnitPunch:
     def excess(log_b: float) -> float:
         return _excess(solve(float(np.exp(log_b)), mu, beta), mu)
 
-    low, high = np.log(SMALLEST), np.log(LARGEST)
+    low, high = np.log(SMALLEST_ARTANH), np.log(LARGEST_ARTANH)
     # The right zone is the smallest whose excess vanishes; under a bonded punch q = mu p at 2 eta v = atan(mu).
     bonded = np.log(np.arctan(mu) * np.pi / (2 * np.arctanh(beta)))
     start = float(np.clip(min(bonded, _uncoupled(mu, beta, axisymmetric)), low, high))
@@ -180,7 +183,7 @@ def _uncoupled(mu: float, beta: float, axisymmetric: bool) -> float:
             return float(complete * mu / beta - b / np.tanh(b))
         return float(complete / ellipkm1(1 / np.cosh(b) ** 2) - beta / mu)
 
-    low, high = np.log(SMALLEST), np.log(LARGEST)
+    low, high = np.log(SMALLEST_ARTANH), np.log(LARGEST_ARTANH)
     if difference(low) * difference(high) > 0:
         return low if difference(low) < 0 else high
     return float(brentq(difference, low, high))

@@ -24,7 +24,7 @@ from contactopt.errors import InputError
 MOST_RUNS = 200_000  # of one experiment
 BOUNDS = {"time_limit": (0.0, 1e6), "memory_limit": (0.2, 1e4)}  # s; GB: less than the least holds no NumPy and SciPy
 MOST = {"repeats": MOST_RUNS, "max_iterations": 10**9, "seed": 2**32 - 1}  # NumPy's generator takes no larger seed
-LARGEST = 2**63  # of whole numbers, as in TOML
+LARGEST_INTEGER = 2**63  # of whole numbers, as in TOML
 
 
 class NothingToRun(InputError):
@@ -306,7 +306,7 @@ def values_of(name: str, value: Any) -> list[Any]:
     if not isinstance(value, dict):
         values = value if isinstance(value, list) else [value]
         for one in values:
-            if not isinstance(one, str | int | float) or (isinstance(one, int) and abs(one) >= LARGEST):
+            if not isinstance(one, str | int | float) or (isinstance(one, int) and abs(one) >= LARGEST_INTEGER):
                 raise InputError(f"a value of '{name}' must be a text, a number, true or false; got {short(one)}")
         return values
     if not {"from", "to", "steps"} <= set(value) or set(value) - {"from", "to", "steps", "scale"}:

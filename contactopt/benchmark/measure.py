@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -21,12 +21,9 @@ from contactopt.errors import InputError
 from contactopt.problem import (
     InterfaceProblem,
     Status,
-    balance_residual,
-    fit_multipliers,
     natural_map_residual,
 )
-from contactopt.problem.certificate import balanced_step
-from contactopt.problem.cones import coulomb_cone
+from contactopt.problem.laws.associated import Associated
 
 ENDS = ("refused", "error", "backend_failed", "out_of_memory", "not_built")  # what a run without an answer may say
 MEASURED = ("call_seconds", "cpu_seconds", "peak_mb", "base_mb")  # columns that the worker fills
@@ -195,13 +192,5 @@ def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, An
 
 
 def associated_residual(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray | None) -> float:
-    """As natural_map_residual for the associated law: |r - proj_K(r - rho u)| over the same size, and the balance."""
-    if not np.all(np.isfinite(r)):
-        return np.inf
-    lam = fit_multipliers(problem, r) if lam is None else lam
-    w = problem.q + (problem.V @ lam).reshape(r.shape)
-    moved = (problem.Q @ r.ravel()).reshape(r.shape)
-    rho = balanced_step(r, moved, moved + w, w)
-    size = max(np.linalg.norm(r), rho * np.linalg.norm(w), rho * np.linalg.norm(moved + w))
-    gap = np.linalg.norm(r - coulomb_cone(r - rho * (moved + w), problem.mu))
-    return float(max(gap / size if size > 0 else 0.0, balance_residual(problem, r)))
+    """The certificate of the same problem under the associated law."""
+    return natural_map_residual(replace(problem, law=Associated(problem.mu)), r, lam)

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from skfem.helpers import dot
 
 from contactopt.bodies.elements import SHAPES, Trace, contact_trace, make_basis, node_unknowns, straight, weight_at
+from contactopt.bodies.motions import Motions, check_free, free_motions
 from contactopt.bodies.stiffness import stiffness
 from contactopt.errors import InputError
 from contactopt.material import Material
@@ -27,12 +28,15 @@ from contactopt.scenes.scene import Part, Plate, Scene, Traction
 class Assembly:
     """A discretised Part with n displacement unknowns, of which those in `free` are not prescribed.
 
-    A       (n, n) sparse stiffness; not singular on the free unknowns
+    A       (n, n) sparse stiffness; singular on the free unknowns if there are free motions
     load    (n,) nodal forces of tractions and body forces
     lift    (n,) prescribed displacements of the supports, 0 elsewhere
     motion  (n, p) unit motions of the p plate components that may move; zero on free unknowns
     thrust  (p,) total forces on them
     traces  name of each candidate contact boundary -> trace of the displacement there: nodes, areas, normals, weights, cells
+    rigid   rigid motions that no support and no plate holds
+    driven  what each column of `motion` is, for messages
+    holders name of each support and plate -> the unknowns that it holds or drives, each unknown with one of them
     """
 
     name: str
@@ -47,6 +51,9 @@ class Assembly:
     motion: np.ndarray
     thrust: np.ndarray
     traces: Mapping[str, Trace]
+    rigid: Motions
+    driven: tuple[str, ...]
+    holders: Mapping[str, np.ndarray]
 
     @property
     def trace(self) -> Trace:
@@ -105,7 +112,7 @@ class Assembly:
 
 
 def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Assembly:
-    """Mesh and assemble one Part of a Scene; raises InputError for a body that could move freely."""
+    """Mesh and assemble one Part of a Scene."""
     mesh = part.build_mesh(elements, zone)
     _check_mesh(scene, part, mesh)
     axisymmetric = scene.kind == "axisymmetric"
@@ -119,9 +126,11 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
             f"body '{part.name}': its mesh falls into {pieces} pieces; remove nodes that belong to no element, "
             "merge duplicated nodes, or model each piece as a body of its own."
         )
-    lift, held, motion, thrust = _constraints(scene, part, basis)
-    _check_rigid_modes(scene, part, basis, held)
-    contacts = {name: contact_trace(basis, scene.degree, mesh.boundaries[name], weight) for name in (part.contact,)}
+    lift, held, motion, thrust, driven, holders = _constraints(scene, part, basis)
+    rigid = free_motions(scene.kind, scene.components, basis, node_unknowns(basis), held, weight)
+    check_free(part.name, A, rigid)
+    surfaces = scene.surfaces_of(part)
+    contacts = {name: contact_trace(basis, scene.degree, mesh.boundaries[name], weight) for name in surfaces}
     return Assembly(
         part.name,
         scene.kind,
@@ -135,12 +144,15 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         motion,
         thrust,
         contacts,
+        rigid,
+        driven,
+        holders,
     )
 
 
 def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     """The same body under the load values of another scene; InputError if other unknowns are held or driven there."""
-    lift, held, motion, thrust = _constraints(scene, part, body.basis)
+    lift, held, motion, thrust, *_ = _constraints(scene, part, body.basis)
     if not np.array_equal(np.flatnonzero(~held), body.free) or not np.array_equal(motion, body.motion):
         raise InputError(f"body '{part.name}': supports or plates hold other unknowns than before; reduce it anew.")
     return replace(body, load=_load(part, body.basis, body.weight), lift=lift, thrust=thrust)
@@ -159,7 +171,7 @@ def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
             f"body '{part.name}': an axisymmetric mesh lies in r >= 0; its least r is {mesh.p[0].min():g}."
         )
     known = mesh.boundaries or {}
-    names = [part.contact, *(s.boundary for s in part.supports)]
+    names = [*scene.surfaces_of(part), *(s.boundary for s in part.supports)]
     names += [load.boundary for load in part.loads if isinstance(load, (Traction, Plate))]
     for name in names:
         if name not in known or len(known[name]) == 0:
@@ -185,14 +197,22 @@ def _load(part: Part, basis: skfem.CellBasis, weight: tuple[float, bool]) -> np.
     return total
 
 
-def _constraints(scene: Scene, part: Part, basis: skfem.CellBasis) -> tuple[np.ndarray, ...]:
-    """Prescribed displacements, the mask of unknowns that are not free, plate motions and plate forces."""
+def _constraints(
+    scene: Scene, part: Part, basis: skfem.CellBasis
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, tuple[str, ...], dict[str, np.ndarray]]:
+    """Prescribed displacements, mask of unknowns that are not free, plate motions, forces and names, and who holds what."""
     lift, held = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
     table = node_unknowns(basis)
 
     def unknowns(boundary: str, component: str) -> np.ndarray:
         there = basis.get_dofs(facets=np.asarray(basis.mesh.boundaries[boundary])).flatten()
         return np.intersect1d(there, table[scene.components.index(component)])
+
+    holders: dict[str, np.ndarray] = {}
+
+    def holds(name: str, where: np.ndarray) -> None:
+        known = np.concatenate([np.zeros(0, dtype=int), *holders.values()])
+        holders[name] = np.union1d(holders.get(name, known[:0]), np.setdiff1d(where, known))
 
     for support in part.supports:
         values = dict.fromkeys(scene.components, 0.0) if support.displacement is None else support.displacement
@@ -204,7 +224,8 @@ def _constraints(scene: Scene, part: Part, basis: skfem.CellBasis) -> tuple[np.n
                     "node where another support prescribes a different value."
                 )
             lift[where], held[where] = value, True
-    columns, thrust = [], []
+            holds(f"support '{support.boundary}'", where)
+    columns, thrust, names = [], [], []
     supported = held.copy()
     for plate in (load for load in part.loads if isinstance(load, Plate)):
         for component in scene.components:
@@ -219,6 +240,7 @@ def _constraints(scene: Scene, part: Part, basis: skfem.CellBasis) -> tuple[np.n
                 column[where] = 1.0
                 columns.append(column)
                 thrust.append(plate.force[component])
+                names.append(f"plate '{plate.boundary}' along {component}")
             elif not plate.glued:
                 continue
             elif np.any(lift[where] != 0):
@@ -227,36 +249,7 @@ def _constraints(scene: Scene, part: Part, basis: skfem.CellBasis) -> tuple[np.n
                     "drop the plate or the support."
                 )
             held[where] = True
+            holds(f"plate '{plate.boundary}'", where)
         supported = held.copy()
     motion = np.stack(columns, axis=1) if columns else np.zeros((basis.N, 0))
-    return lift, held, motion, np.array(thrust, dtype=float)
-
-
-def _check_rigid_modes(scene: Scene, part: Part, basis: skfem.CellBasis, held: np.ndarray) -> None:
-    """The motions of the body as a rigid whole must not all leave the held unknowns at rest."""
-    table = node_unknowns(basis)
-    x = basis.doflocs[:, table[0]]
-    x = x - x.mean(axis=1, keepdims=True)
-    x = x / np.abs(x).max()
-    names, modes = [], []
-    for i, component in enumerate(scene.components):
-        if not (scene.kind == "axisymmetric" and component == "r"):
-            modes.append(np.zeros_like(x))
-            modes[-1][i] = 1.0
-            names.append(f"translation along {component}")
-    if scene.kind != "axisymmetric":
-        for i in range(scene.dim):
-            for j in range(i):
-                modes.append(np.zeros_like(x))
-                modes[-1][i], modes[-1][j] = x[j], -x[i]
-                names.append(f"rotation in the {scene.components[j]}-{scene.components[i]} plane")
-    R = np.zeros((basis.N, len(modes)))
-    for column, mode in zip(R.T, modes):
-        column[table] = mode
-    values, vectors = np.linalg.eigh(R[held].T @ R[held])  # its kernel: the motions that nothing holds
-    if values[0] < 1e-12 * held.sum() or not held.any():
-        motion = names[int(np.argmax(np.abs(vectors[:, 0])))]
-        raise InputError(
-            f"body '{part.name}' is free to move ({motion}), so its stiffness is singular; "
-            "add a Support, or load it through a rigid Plate."
-        )
+    return lift, held, motion, np.array(thrust, dtype=float), tuple(names), holders

@@ -7,6 +7,9 @@ displacement field Z = M - A_ff^-1 A_f: M. Contact forces F and loads f meet in 
 
 Motions that no support resists, the kernel of Z' A Z, become multipliers of the interface problem. The others add to the
 compliance: C = A_ff^-1 + soft soft', where each column of `soft` is one of them, scaled by its stiffness.
+
+Rigid motions that neither supports nor plates hold are multipliers, too. A_ff^-1 is then the generalised inverse of
+contactopt.bodies.motions, the inverse G on the unknowns `kept` with a correction of low rank.
 """
 
 from __future__ import annotations
@@ -35,18 +38,22 @@ KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body
 class ElasticBody:
     """An Assembly with a solver of its linear system, as contactopt.bodies.protocol.Body asks.
 
-    interface   (m,) free unknowns of the contact surface, on which contact forces act
+    kept        free unknowns without the fixing unknowns of a body that floats
+    interface   (m,) kept unknowns of the contact surfaces, on which contact forces act
     at_rest     (n,) displacement without contact forces and multipliers [length]
+    relief      (n, i) the fields Y of the i free rigid motions (contactopt.bodies.motions)
     extended    (n, j) displacement fields Z of all plate motions
     modes       (j, p) and (j, j - p) combinations of them that move freely, and those with elastic resistance, scaled so
                 that each field `soft` = Z modes[1] adds soft soft' to the compliance
-    resultants  (p,) resultants s of the loads in the free motions
+    resultants  (p + i,) resultants s of the loads in the free motions, those of plates first
     """
 
     body: Assembly
     solver: BodySolver
+    kept: np.ndarray
     interface: np.ndarray
     at_rest: np.ndarray
+    relief: np.ndarray
     extended: np.ndarray
     modes: tuple[np.ndarray, np.ndarray]
     resultants: np.ndarray
@@ -73,8 +80,11 @@ class ElasticBody:
 
     @cached_property
     def equilibrium(self) -> Equilibrium | None:
-        iteration, free = self.solver.iteration, self.body.free
-        return None if iteration is None else Equilibrium(*iteration, self.body.A.diagonal()[free], free, self.soft)
+        iteration, kept = self.solver.iteration, self.kept
+        if iteration is None:
+            return None
+        everywhere = sp.identity(len(self.body.load), format="csr")
+        return Equilibrium(*iteration, self.body.A.diagonal()[kept], kept, self._low_rank(everywhere))
 
     @property
     def interface_compliance(self) -> np.ndarray:
@@ -83,8 +93,13 @@ class ElasticBody:
 
     @cached_property
     def motions(self) -> np.ndarray:
-        """(n, p) displacement fields of the free plate motions."""
-        return np.asarray(self.extended @ self.modes[0])
+        """(n, p + i) displacement fields of the free motions, those of plates first."""
+        return np.concatenate([self.extended @ self.modes[0], self.body.rigid.fields], axis=1)
+
+    @property
+    def motion_names(self) -> tuple[str, ...]:
+        strongest = np.argmax(np.abs(self.modes[0]), axis=0) if self.modes[0].size else []
+        return (*(self.body.driven[i] for i in strongest), *self.body.rigid.names)
 
     @cached_property
     def soft(self) -> np.ndarray:
@@ -96,31 +111,43 @@ class ElasticBody:
         """Products with the block of A_ff^-1 on `interface`."""
         if self.complete:
             return self.solver.trailing_product
-        return self.solver.restricted(np.searchsorted(self.body.free, self.interface))
+        return self.solver.restricted(np.searchsorted(self.kept, self.interface))
+
+    def _low_rank(self, T: sp.csr_matrix) -> tuple[np.ndarray, np.ndarray]:
+        """L, R (rows, j) with T C T' = T G T' + L R'."""
+        soft, Z, Y = T @ self.soft, T @ self.body.rigid.fields, T @ self.relief
+        if not Z.shape[1]:
+            return soft, soft  # one array, so that their product is symmetric to the last digit
+        return np.concatenate([soft, -Z, -Y], axis=1), np.concatenate([soft, Y, Z], axis=1)
 
     def product(self, T: sp.csr_matrix) -> Product:
-        local, act, soft = T[:, self.interface], self._restricted, T @ self.soft
+        local, act, (left, right) = T[:, self.interface], self._restricted, self._low_rank(T)
         back = local.T.tocsr()
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
-            return np.asarray(local @ act(back @ X, accuracy) + soft @ (soft.T @ X))
+            return np.asarray(local @ act(back @ X, accuracy) + left @ (right.T @ X))
 
         return product
 
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
-        local, soft = T[:, self.interface], T @ self.soft
-        C = local @ (local @ self.interface_compliance).T
-        return np.asarray((C + C.T) / 2 + soft @ soft.T)
+        local, (left, right) = T[:, self.interface], self._low_rank(T)
+        C, added = local @ (local @ self.interface_compliance).T, left @ right.T
+        return np.asarray((C + C.T) / 2 + (added + added.T) / 2)
 
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
-        size = np.asarray(abs(T[:, self.interface]).sum(axis=1)).ravel() + np.abs(T @ self.soft).sum(axis=1)
+        size = np.asarray(abs(T[:, self.interface]).sum(axis=1)).ravel() + np.abs(self._low_rank(T)[1]).sum(axis=1)
         return np.asarray(size > 0)
 
     def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """U of all unknowns, eq (13) of the paper."""
         U = self.at_rest + self.soft @ (self.soft.T @ force) + self.motions @ multipliers
-        U[self.body.free] += self.solver.solve(force[self.body.free])
-        return np.asarray(U)
+        return np.asarray(U + self.relieved(force))
+
+    def relieved(self, force: np.ndarray) -> np.ndarray:
+        """Displacements (n,) or (n, j) under nodal forces on the free unknowns, with plates at rest."""
+        U, Z = np.zeros(force.shape), self.body.rigid.fields
+        U[self.kept] = self.solver.solve(force[self.kept])
+        return np.asarray(U - Z @ (self.relief.T @ force) - self.relief @ (Z.T @ force))
 
     def energy(self, U: np.ndarray) -> float:
         return float(U @ (self.body.A @ U)) / 2
@@ -131,6 +158,16 @@ class ElasticBody:
         F[body.free] = body.load[body.free]
         total = body.thrust + body.motion.T @ body.load
         return np.asarray(F + body.motion @ ((total - body.motion.T @ F) / body.motion.sum(axis=0)))
+
+    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        body, table = self.body, self.body.unknowns
+        F = body.A @ U - body.load - force
+        found = {}
+        for name, unknowns in body.holders.items():
+            own = np.zeros(len(F))
+            own[unknowns] = F[unknowns]
+            found[name] = body.locations, own[table]
+        return found
 
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
@@ -172,8 +209,9 @@ class AssembledElastic:
         trace, unknowns = body.traces[name], body.unknowns
         nodes = np.unique(trace.weights.indices)
         places = body.locations[:, nodes]
-        if self.part.curve is not None:
-            places = np.asarray(self.part.curve(places), dtype=float)
+        curve = self.part.curve_of(name)
+        if curve is not None:
+            places = np.asarray(curve(places), dtype=float)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False
         facets = np.asarray(body.basis.mesh.boundaries[name])
@@ -187,7 +225,7 @@ class AssembledElastic:
             tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
             held[unknowns[:, trace.nodes]],
             trace.cells,
-            Mesh(body.basis, body.degree, facets, body.weight, body.locations, unknowns, held, self.part.curve),
+            Mesh(body.basis, body.degree, facets, body.weight, body.locations, unknowns, held, curve),
         )
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
@@ -234,27 +272,38 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     dofs, n = body.unknowns, len(body.load)
     node, component, place = np.empty(n, int), np.empty(n, int), np.full(n, -1)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
-    place[body.free] = np.arange(len(body.free))
-    interface = np.intersect1d(body.contact_dofs, body.free)
-    A = body.A[body.free][:, body.free]
+    kept = np.setdiff1d(body.free, body.rigid.fixing)
+    place[kept] = np.arange(len(kept))
+    interface = np.intersect1d(body.contact_dofs, kept)
+    A = body.A[kept][:, kept]
     last = place[interface] if entries else None
-    made = make_solver(solver, System(A, node[body.free], component[body.free], body.locations, last))
+    made = make_solver(solver, System(A, node[kept], component[kept], body.locations, last))
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
+    relief = _relief(body, made, kept)
     # A plate that alone holds a body along itself moves it as a rigid whole, for which there is nothing to solve.
-    rigid = _rigid_extension(body)
-    extended = rigid.copy()
-    lacking = body.A @ rigid
-    strained = np.abs(lacking[body.free]).max(axis=0, initial=0.0) > RIGID * np.abs(body.A @ body.motion).max(
-        axis=0, initial=0.0
-    )
+    extended = _rigid_extension(body)
+    lacking, forces = (np.abs((body.A @ motion)[kept]).max(axis=0, initial=0.0) for motion in (extended, body.motion))
+    strained = lacking > RIGID * forces
     if strained.any():
-        extended[np.ix_(body.free, strained)] -= made.solve(lacking[np.ix_(body.free, strained)])
+        extended[np.ix_(kept, strained)] -= made.solve((body.A @ extended[:, strained])[kept])
+    if len(body.rigid.names):
+        extended -= body.rigid.fields @ (body.rigid.forces.T @ extended)
     K = extended.T @ (body.A @ extended)
     stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
     moves = stiffness <= KERNEL * np.max(np.sum(body.motion * (body.A @ body.motion), axis=0), initial=0.0)
     free = np.eye(len(K)) if moves.all() else vectors[:, moves]  # keep one multiplier per plate component
     modes = free, vectors[:, ~moves] / np.sqrt(stiffness[~moves])
-    return _at_rest(ElasticBody(body, made, interface, body.lift, extended, modes, body.thrust), body)
+    return _at_rest(ElasticBody(body, made, kept, interface, body.lift, relief, extended, modes, body.thrust), body)
+
+
+def _relief(body: Assembly, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
+    """Y = G S - Z (S' G S) / 2 of contactopt.bodies.motions, (n, i)."""
+    Z, S = body.rigid.fields, body.rigid.forces
+    Y = np.zeros(Z.shape)
+    if Z.shape[1]:
+        Y[kept] = solver.solve(S[kept])
+        Y -= Z @ (S.T @ Y) / 2
+    return Y
 
 
 def _rigid_extension(body: Assembly) -> np.ndarray:
@@ -276,6 +325,6 @@ def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:
     """The body `old` under the loads of `body`."""
     residual = body.load - body.A @ body.lift
     thrust = body.thrust + old.extended.T @ residual
-    at_rest = body.lift + old.soft @ (old.modes[1].T @ thrust)
-    at_rest[body.free] += old.solver.solve(residual[body.free])
-    return replace(old, body=body, at_rest=at_rest, resultants=old.modes[0].T @ thrust)
+    at_rest = body.lift + old.soft @ (old.modes[1].T @ thrust) + old.relieved(residual)
+    resultants = np.concatenate([old.modes[0].T @ thrust, body.rigid.fields.T @ body.load])
+    return replace(old, body=body, at_rest=at_rest, resultants=resultants)

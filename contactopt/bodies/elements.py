@@ -84,9 +84,14 @@ def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellB
 
 
 class LeanBasis(skfem.CellBasis):
-    """A CellBasis that evaluates a shape function whenever it is asked for, for all of them take more than the stiffness.
+    """A CellBasis that evaluates each shape function when it is asked for.
 
-    Arguments: mesh, element and order of the quadrature.
+    The values of all shape functions would take more memory than the stiffness matrix.
+
+    Parameters
+    ----------
+    mesh, element : of scikit-fem
+    order : of the quadrature
     """
 
     def __init__(self, mesh: skfem.Mesh, element: skfem.Element, order: int):
@@ -140,22 +145,27 @@ def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, wei
     if degree == 1:
         cells = np.arange(cells.shape[1])[None]  # the whole face
         places = places[:, cells[0]]
+    # Values phi_v of the hat functions at the quadrature points of a cell, N_j of the shape functions at all of them.
     phi, rule = _cell_rule(name, places, cells, degree)
     at = _face_basis(basis.mesh, shape, boundary, rule)
     N, node = _face_shapes(at, shape, boundary, places)
     split = (len(boundary), len(cells), phi.shape[1])  # face, cell, point
     flat = np.asarray(at.dx)
     measure = (flat * weight_at(weight, np.asarray(at.global_coordinates()))).reshape(split)
+    # For every face f and cell c: int phi_v, int phi_v phi_w and int phi_v N_j.
     area = np.einsum("vq,fcq->fcv", phi, measure)
     mass = np.einsum("vq,wq,fcq->fcvw", phi, phi, measure)
     mixed = np.einsum("vq,fjcq,fcq->fcvj", phi, N.reshape(len(boundary), -1, *split[1:]), measure)
-    dual = area[..., None] * np.linalg.solve(mass, mixed)  # int psi_v N_j of each cell
+    # psi_v = sum_w c_vw phi_w with int psi_v phi_w = delta_vw int phi_v gives c = diag(area) mass^-1 on every cell.
+    dual = area[..., None] * np.linalg.solve(mass, mixed)  # int psi_v N_j
+    # Normals are averaged with the hat functions, and areas summed, over the cells that meet in a contact.
     normal = np.einsum("vq,dfcq->dfcv", phi, (np.asarray(at.normals) * flat).reshape(-1, *split))
     nodes, rows = np.unique(node[:, cells], return_inverse=True)
     rows = rows.reshape(area.shape)
     areas = np.bincount(rows.ravel(), area.ravel())
     normals = np.stack([np.bincount(rows.ravel(), n.ravel()) for n in normal])
     normals = normals / np.linalg.norm(normals, axis=0)
+    # W_ij = int psi_i N_j / A_i, summed over the cells as the sparse matrix is made.
     value, row, column = np.broadcast_arrays(dual / areas[rows][..., None], rows[..., None], node[:, None, None, :])
     size = len(nodes), node_unknowns(basis).shape[1]
     W = sp.csr_matrix((value.ravel(), (row.ravel(), column.ravel())), size)
@@ -163,6 +173,16 @@ def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, wei
     W.eliminate_zeros()
     corners = rows.reshape(-1, rows.shape[2]).T
     return Trace(nodes, areas, _clean(normals), W, corners)  # exact axes stay exact
+
+
+def face_nodes(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (face, j) of the faces of a boundary, corners first in cyclic order, and mean outward normals (dim, face)."""
+    name = basis.mesh.refdom.__name__
+    shape, places = SHAPES[name][1][degree](), FACES[name][2]
+    if degree == 1:
+        places = places[:, : FACES[name][1].doflocs.shape[0]]
+    at = _face_basis(basis.mesh, shape, boundary, (places, np.ones(places.shape[1])))
+    return _face_shapes(at, shape, boundary, places)[1], np.asarray(at.normals).mean(axis=2)
 
 
 def _cell_rule(
@@ -196,14 +216,15 @@ def _face_basis(
 def _face_shapes(
     at: skfem.FacetBasis, shape: skfem.Element, boundary: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions (face, j, point) of the nodes at the places of every face, and these nodes (face, j)."""
+    """Values (face, j, point) of the shape functions of the face's nodes at the points of `at`, and these nodes (face, j)."""
     nodal = _face_basis(at.mesh, shape, boundary, (places, np.ones(places.shape[1])))
-    local = np.argmax(np.stack([np.asarray(f[0]) for f in nodal.basis], axis=1), axis=1)  # the one that is 1 there
+    # Of the element's shape functions, the one of a node is that which is 1 there.
+    local = np.argmax(np.stack([np.asarray(f[0]) for f in nodal.basis], axis=1), axis=1)
     N = np.take_along_axis(np.stack([np.asarray(f[0]) for f in at.basis], axis=1), local[:, :, None], axis=1)
     unknowns = np.take_along_axis(nodal.element_dofs.T, local, axis=1)
     return N, np.argsort(node_unknowns(nodal)[0])[unknowns]
 
 
 def _clean(values: np.ndarray) -> np.ndarray:
-    """Rounding made zero."""
+    """The values with those that are only rounding errors set to zero."""
     return np.where(np.abs(values) < NOISE, 0.0, values)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ class Fields:
     """One body after the solve, at the n vertices of its mesh.
 
     displacement (dim, n) [length];  stress (n, 4 or 6) [stress], components named in `names`;  von_mises (n,)
+    contact      name -> (n,) or (n, 3) contact quantities at the nodes, if they were asked for
     """
 
     name: str
@@ -34,14 +36,15 @@ class Fields:
     displacement: np.ndarray
     stress: np.ndarray
     von_mises: np.ndarray
+    contact: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def write_vtu(self, path: Path) -> None:
-        """The body as a VTU file with displacement, stress components and von Mises stress at the nodes."""
+        """The body as a VTU file with displacement, stress, von Mises stress and contact quantities at the nodes."""
         from skfem.io.meshio import to_meshio
 
         flat = {f"stress_{name}": column for name, column in zip(self.names, self.stress.T)}
         vectors = np.pad(self.displacement, ((0, 3 - len(self.displacement)), (0, 0))).T
-        data = {"displacement": vectors, "von_mises": self.von_mises, **flat}
+        data = {"displacement": vectors, "von_mises": self.von_mises, **flat, **self.contact}
         mesh = to_meshio(self.mesh, point_data=data, encode_cell_data=False, encode_point_data=False)
         mesh.points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
         mesh.write(path, file_format="vtu")

@@ -56,20 +56,20 @@ class Mesh:
 class Equilibrium:
     """The linear system of a body that is solved by iteration, by what each iteration needs.
 
-    With E (n, j) the columns of the identity for the unknowns `free`, the compliance is C = E A^-1 E' + soft soft'.
+    With E (n, j) the columns of the identity for the unknowns `free`, the compliance is C = E A^-1 E' + L R', whose second term is symmetric as well.
 
     stiffness  x (j,) -> A x [force]
     cycle      f (j,) -> B f, symmetric positive definite and close to A^-1 f [length]
     diagonal   (j,) diagonal of A
-    free       (j,) numbers of the displacement unknowns that are free
-    soft       (n, i) displacement fields of plates that supports resist
+    free       (j,) numbers of the displacement unknowns that A has
+    low_rank   L and R (n, i): plates that supports resist, free motions of a body that floats
     """
 
     stiffness: Callable[[np.ndarray], np.ndarray]
     cycle: Callable[[np.ndarray], np.ndarray]
     diagonal: np.ndarray
     free: np.ndarray
-    soft: np.ndarray
+    low_rank: tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +148,7 @@ class Body(Protocol):
     name        its name in the scene
     unknowns    number of its free displacement unknowns, for tables
     at_rest     (n,) displacement at F = 0, lambda = 0 [length]
-    motions     (n, p) free motions
+    motions     (n, p) free motions, and motion_names, what each of them is, for messages
     resultants  (p,) work of the loads in the free motions [force]
     iterative   whether products cost iterations, so that a lower accuracy makes them cheaper
     complete    whether the entries of the compliance are cheap
@@ -166,6 +166,9 @@ class Body(Protocol):
 
     @property
     def motions(self) -> np.ndarray: ...
+
+    @property
+    def motion_names(self) -> tuple[str, ...]: ...
 
     @property
     def resultants(self) -> np.ndarray: ...
@@ -200,6 +203,12 @@ class Body(Protocol):
 
     def external_forces(self, U: np.ndarray) -> np.ndarray:
         """Forces (n,) of loads, supports and plates on the body in equilibrium at the displacement U (n,)."""
+
+    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """For each support and plate its positions (dim, m) and the forces (dim, m) with which it acts on the body there.
+
+        U (n,) is the displacement under the contact forces `force` (n,).
+        """
 
     def fields(self, U: np.ndarray) -> Fields | None:
         """Displacement and stress at the displacement U (n,); None for a body without any."""

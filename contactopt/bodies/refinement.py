@@ -13,8 +13,8 @@ from contactopt.errors import InputError
 from contactopt.scenes.scene import Part, Scene
 
 
-def split(mesh: Any, contact: str) -> Any:
-    """The plane mesh with all elements halved, new nodes of a curved contact boundary on a cubic spline.
+def split(mesh: Any, *contacts: str) -> Any:
+    """The plane mesh with all elements halved, new nodes of curved contact boundaries on cubic splines.
 
     The spline gives the height over the coordinate along which the boundary extends most, so that partners on
     two bodies stay partners. Raises InputError for meshes of solids (scikit-fem drops their boundaries) or of curved elements.
@@ -25,11 +25,12 @@ def split(mesh: Any, contact: str) -> Any:
             "(elements, zone) -> mesh instead."
         )
     fine = mesh.refined(1)
-    old, new = (np.unique(m.facets[:, m.boundaries[contact]]) for m in (mesh, fine))
-    along = int(np.argmax(np.ptp(mesh.p[:, old], axis=1)))
-    order = old[np.argsort(mesh.p[along, old])]
     p = fine.p.copy()
-    p[1 - along, new] = CubicSpline(mesh.p[along, order], mesh.p[1 - along, order])(p[along, new])
+    for contact in contacts:
+        old, new = (np.unique(m.facets[:, m.boundaries[contact]]) for m in (mesh, fine))
+        along = int(np.argmax(np.ptp(mesh.p[:, old], axis=1)))
+        order = old[np.argsort(mesh.p[along, old])]
+        p[1 - along, new] = CubicSpline(mesh.p[along, order], mesh.p[1 - along, order])(p[along, new])
     return replace(fine, doflocs=p)
 
 
@@ -43,9 +44,9 @@ def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
         def mesh(_: int, zone: float | None) -> Any:
             made = part.build_mesh(elements, zone)
             for _ in range(splits):
-                made = split(made, part.contact)
+                made = split(made, *scene.surfaces_of(part))
             return made
 
         return replace(part, mesh=mesh)
 
-    return replace(scene, upper=finer(scene.upper), lower=finer(scene.lower)) if splits else scene
+    return scene.with_parts(finer) if splits else scene

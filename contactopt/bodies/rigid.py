@@ -42,6 +42,10 @@ class RigidBody:
         return np.eye(len(self.components))[:, columns]
 
     @property
+    def motion_names(self) -> tuple[str, ...]:
+        return tuple(f"translation along {component}" for component in self._force)
+
+    @property
     def resultants(self) -> np.ndarray:
         return np.array(list(self._force.values()), dtype=float)
 
@@ -98,6 +102,10 @@ class RigidBody:
     def external_forces(self, U: np.ndarray) -> np.ndarray:
         """The total forces. What holds the other components does no work and is left out."""
         return np.asarray(self.motions @ self.resultants)
+
+    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Nothing: what holds a rigid body is what its contacts ask for."""
+        return {}
 
     def fields(self, U: np.ndarray) -> None:
         return None

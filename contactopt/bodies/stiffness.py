@@ -37,6 +37,7 @@ def stiffness(basis: skfem.CellBasis, material: Material, weight: tuple[float, b
     owner = np.repeat(np.arange(graph.shape[0]), np.diff(graph.indptr))
     known = owner * graph.shape[0] + graph.indices  # ascending
     data = np.zeros(len(indices))
+    # Entry (a, b) of the block of two nodes stands at first + a step + b, and pairs of nodes are found by bisection.
     a, b = np.arange(dim)[:, None, None], np.arange(dim)
     for piece in _pieces(len(nodes), dim * nodes.shape[1]):
         own = nodes[piece].astype(np.int64)
@@ -63,7 +64,7 @@ def _element_matrices(
     g = np.ascontiguousarray(np.moveaxis(g, (2, 0, 1, 3), (0, 1, 2, 3)))  # (element, i, a, point)
     divergence = g
     if weight[1]:
-        hoop = np.stack([np.asarray(f.value) for f in fields], axis=1) / x[0][:, None]
+        hoop = np.stack([np.asarray(f) for f in fields], axis=1) / x[0][:, None]
         divergence = g.copy()
         divergence[:, :, 0] += hoop
     K = lam * _pairs(divergence, measure)

@@ -70,7 +70,7 @@ def lay_out(contacts: ContactPoints, copies: int, axisymmetric: bool) -> tuple[C
     axisymmetric
         Whether the first coordinate is the distance from an axis.
     """
-    planes = _symmetry_planes(contacts)
+    planes = symmetry_planes(contacts)
     mirrors = copies > 1
     if axisymmetric and contacts.points[0].min() <= NEAR * contacts.size:
         planes, mirrors = [SymmetryPlane(np.array([1.0, 0.0]), 0.0)], True
@@ -97,7 +97,7 @@ def _clockwise(normals: np.ndarray) -> np.ndarray:
     return np.stack([normals[1], -normals[0]])
 
 
-def _symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
+def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
     """The planes across one component on which exactly the tangential displacement along it is held."""
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
     for c, still in enumerate(held):
@@ -114,6 +114,20 @@ def _symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
             inward[c] = side[0]
             planes.append(SymmetryPlane(inward, offset * side[0]))
     return planes
+
+
+def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
+    """The normals (dim, k); at planes of symmetry they lie in the plane.
+
+    The mean over the facets that are modelled leaves out their mirror images, and so is tilted on a curved surface.
+    """
+    normals = contacts.normals
+    for plane in symmetry_planes(contacts):
+        straight = normals - plane.inward[:, None] * (plane.inward @ normals)
+        straight = straight / np.linalg.norm(straight, axis=0).clip(NEAR)
+        tilted = plane.contains(contacts.points, contacts.size) & (np.abs(plane.inward @ normals) > NEAR)
+        normals = np.where(tilted, straight, normals)
+    return normals
 
 
 def _line(

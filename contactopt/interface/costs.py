@@ -1,7 +1,7 @@
 """The choice between the forms of Q by their cost, with every number that it rests on.
 
 `python -m experiments.questions.form_of_q` measures PRODUCTS, SOLVE, DENSE and the entries of the factors on punches of growing size,
-and the table of costs of `python -m experiments.preconditioners` shows where the two forms cost the same. LARGEST is not
+and the table of costs of `python -m experiments.questions.preconditioners` shows where the two forms cost the same. MOST_EXPLICIT is not
 fitted but chosen: an array of half a gigabyte.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 PRODUCTS = 60  # with Q, of a solve from cold
 SOLVE = {2: 1.2, 3: 0.4}  # time of an operation of a product over one of the elimination, by dimension
 DENSE = 10  # speed of dense linear algebra over that of a sparse factorisation
-LARGEST = 8000  # interface unknowns of an explicit Q that is chosen without being asked for
+MOST_EXPLICIT = 8000  # interface unknowns of an explicit Q that is chosen without being asked for
 
 
 def form_of(m: int, n: int, dim: int, iterative: bool) -> str:
@@ -36,4 +36,6 @@ def form_of(m: int, n: int, dim: int, iterative: bool) -> str:
     """
     explicit = m**3 / 3 + 3 * m**3 / DENSE
     entries = 4 * n * np.log2(max(n, 2)) if dim == 2 else 17 * n ** (4 / 3)
-    return "implicit" if iterative or m > LARGEST or explicit > 4 * PRODUCTS * SOLVE[dim] * entries else "explicit"
+    return (
+        "implicit" if iterative or m > MOST_EXPLICIT or explicit > 4 * PRODUCTS * SOLVE[dim] * entries else "explicit"
+    )

@@ -23,16 +23,17 @@ def coupled_form(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> Coupl
         Their signed maps B (k dim, n), as in contactopt.interface.reduction.
     """
     systems: list[Equilibrium] = []
-    traces, plates, others = [], [], []
+    traces, left, right, others = [], [], [], []
     for body, B in zip(bodies, maps):
         if body.equilibrium is not None:
             systems.append(body.equilibrium)
             traces.append(B[:, body.equilibrium.free])
-            plates.append(B @ body.equilibrium.soft)
+            left.append(B @ body.equilibrium.low_rank[0])
+            right.append(B @ body.equilibrium.low_rank[1])
         elif body.moved(B).any():
             others.append(body.product(B))
     ends = np.cumsum([len(system.free) for system in systems])[:-1]
-    soft = np.concatenate(plates, axis=1)
+    L, R = np.concatenate(left, axis=1), np.concatenate(right, axis=1)
 
     def all_bodies(acts: Sequence[Act]) -> Act:
         def act(X: np.ndarray) -> np.ndarray:
@@ -41,7 +42,7 @@ def coupled_form(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> Coupl
         return act
 
     def rest(r: np.ndarray) -> np.ndarray:
-        total = soft @ (soft.T @ r)
+        total = L @ (R.T @ r)
         for product in others:
             total += product(r[:, None], None)[:, 0]
         return np.asarray(total)

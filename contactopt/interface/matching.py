@@ -7,8 +7,9 @@ from scipy.spatial import KDTree
 
 from contactopt.bodies.protocol import AssembledBody, Surface
 from contactopt.errors import InputError
-from contactopt.interface.charts import ContactPoints, lay_out
-from contactopt.interface.coupling import Coupling, local_map
+from contactopt.interface.charts import ContactPoints, lay_out, normals_in_planes, symmetry_planes
+from contactopt.interface.coupling import Coupling, local_map, renumbered
+from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
 MATCH = 1e-6  # nodes match within this fraction of the shortest distance between contact nodes
@@ -18,24 +19,43 @@ STEPS = 20  # of the search along a normal, which usually takes two
 CHUNK = 256  # nodes that are compared with all others at a time
 
 
-def couple_nodes(scene: Scene, upper: AssembledBody, lower: AssembledBody) -> Coupling:
+def couple_nodes(scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody) -> Coupling:
     """The coupling whose contacts are the contact nodes of the lower body, or of the upper one if that alone has a mesh.
 
     Frames and areas are those of the body that the contacts belong to. The contacts are numbered along the chart.
+
+    Parameters
+    ----------
+    scene
+        The kind of the scene and its law.
+    pair
+        The pair of surfaces.
+    upper, lower
+        The two bodies, of which at least one has a mesh.
+
+    Returns
+    -------
+    Coupling
+        One contact for each pair of nodes.
 
     Raises
     ------
     InputError
         If the contact nodes of two bodies do not match.
     """
+    names = pair.surfaces
     if upper.meshed and lower.meshed:
-        first, second = upper.surface(), lower.surface()
-        partner, normals = match(first, second), second.normals
+        first, second = upper.surface(names[0]), lower.surface(names[1])
+        partner = match(first, second)
+        held = first.held[:, partner] & second.held
+        normals = normals_in_planes(
+            ContactPoints(second.points, second.normals, second.areas, second.cells, held, 0 * second.areas)
+        )
         apart = (first.weights @ first.places.T)[partner] - second.weights @ second.places.T
         gap = np.sum(normals * apart.T, axis=0)
         lead = second
     else:
-        lead = upper.surface() if upper.meshed else lower.surface()
+        lead = upper.surface(names[0]) if upper.meshed else lower.surface(names[1])
         follower, outward = (lower, -lead.normals) if upper.meshed else (upper, lead.normals)
         other, gap = follower.facing(lead, outward)
         first, second = (lead, other) if upper.meshed else (other, lead)
@@ -44,7 +64,9 @@ def couple_nodes(scene: Scene, upper: AssembledBody, lower: AssembledBody) -> Co
     points = ContactPoints(lead.points, normals, lead.areas, lead.cells, held, gap)
     chart, frames, order = lay_out(points, scene.copies, scene.kind == "axisymmetric")
     upper_map, lower_map = local_map(first, partner[order], frames), local_map(second, order, frames)
-    return Coupling(upper_map, lower_map, frames, gap[order], lead.areas[order], lead.points[:, order], chart)
+    cells = renumbered(lead.cells, order)
+    areas, places, planes = lead.areas[order], lead.points[:, order], tuple(symmetry_planes(points))
+    return Coupling(upper_map, lower_map, frames, gap[order], areas, places, chart, cells, planes)
 
 
 def match(upper: Surface, lower: Surface) -> np.ndarray:

@@ -1,13 +1,15 @@
 """From the bodies to the interface: u = Q r + V lambda + q by domain decomposition (paper, eqs (13)-(14)).
 
 Every body b moves by U_b = at_rest + C_b F + motions lambda under nodal forces F (contactopt.bodies.protocol). The
-coupling gives the map T of each body, from its displacements to local contact frames (n, t1[, t2]). With the signed map
-B_b = T of the upper body, B_b = -T of the lower one,
+coupling of a pair of surfaces gives the maps T of its two bodies, from their displacements to local contact frames
+(n, t1[, t2]). The contacts of all pairs follow each other. The signed map B_b of a body holds, in the rows of each pair
+that it takes part in, T if it is the upper body there and -T if it is the lower one,
 
     u = sum B_b U_b + gap n,   F_b = B_b' r   ==>   Q = sum B_b C_b B_b',   V = [B_b motions_b],   q = sum B_b at_rest_b + gap n.
 
 The free motions of all bodies are the multipliers of the problem, and their resultants make s. Q is an array (explicit) or
-an operator (implicit) whose product is one product with each body.
+an operator (implicit) whose product is one product with each body. Both cost no more than the pairs that each body takes
+part in.
 """
 
 from __future__ import annotations
@@ -22,42 +24,62 @@ import scipy.sparse as sp
 
 from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
-from contactopt.bodies.protocol import Body
+from contactopt.bodies.protocol import AssembledBody, Body, Product
 from contactopt.errors import InputError
-from contactopt.interface.costs import form_of
+from contactopt.interface.costs import MOST_EXPLICIT, form_of
 from contactopt.interface.coupling import Coupling, couple
 from contactopt.interface.equilibrium import coupled_form
-from contactopt.problem import InterfaceProblem
+from contactopt.problem import InterfaceProblem, Law, Pair
 from contactopt.problem.laws import make_law
-from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, estimate_diagonal, nodal_weights
+from contactopt.problem.laws.mixed import join
+from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, dense, estimate_diagonal, nodal_weights
+from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
 log = logging.getLogger(__name__)
+SPARSE = 0.25  # share of the entries of Q that may be other than zero for it to be kept by sparse rows
 
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
     """An InterfaceProblem with what is needed to go back to the bodies.
 
-    bodies    the bodies of the scene, upper first
-    maps      the signed map B (k dim, n) of each body, from its displacements to u
-    coupling  contacts, frames, initial gap, areas, chart
-    seconds   phase -> time
+    bodies     the bodies of the scene, in the order of its parts
+    maps       the signed map B (k dim, n) of each body, from its displacements to u
+    couplings  contacts, frames, initial gap, areas, chart of each pair of surfaces
+    seconds    phase -> time
     """
 
     scene: Scene
     problem: InterfaceProblem
     bodies: tuple[Body, ...]
     maps: tuple[sp.csr_matrix, ...]
-    coupling: Coupling
+    couplings: tuple[Coupling, ...]
     seconds: dict[str, float]
+
+    @property
+    def coupling(self) -> Coupling:
+        """That of a scene with one pair of surfaces; InputError if there are several."""
+        if len(self.couplings) > 1:
+            raise InputError(f"scene '{self.scene.name}' has {len(self.couplings)} pairs of surfaces; take couplings.")
+        return self.couplings[0]
+
+    @property
+    def gap(self) -> np.ndarray:
+        """(k,) initial gap of all contacts [length]."""
+        return np.concatenate([made.gap for made in self.couplings])
+
+    @property
+    def frames(self) -> np.ndarray:
+        """(k, dim, dim) rows n, t1[, t2] of all contacts."""
+        return np.concatenate([made.frames for made in self.couplings])
 
     @property
     def operator(self) -> InterfaceOperator:
         """Q by its products, whatever the form of problem.Q."""
         if isinstance(self.problem.Q, InterfaceOperator):
             return self.problem.Q
-        return _operator(self.bodies, self.maps, self.coupling)
+        return _operator(self.bodies, self.maps, self.couplings)
 
     @property
     def iterative(self) -> bool:
@@ -87,9 +109,9 @@ class Reduction:
         """
         start = time.perf_counter()
         bodies = tuple(old.loaded(scene, part) for old, part in zip(self.bodies, scene.parts))
-        q, V, s = _linear_terms(bodies, self.maps, self.coupling)
-        law = make_law(scene.law, scene.mu, self.coupling.areas, self.coupling.positions)
-        problem = replace(self.problem, q=q, V=V, s=s, law=law)
+        q, V, s = _linear_terms(bodies, self.maps, self.couplings)
+        law = _law(scene.pairs, self.couplings)
+        problem = replace(self.problem, q=q, V=V, s=s, law=law, motions=_names(bodies))
         seconds = {"load": time.perf_counter() - start}
         return replace(self, scene=scene, problem=problem, bodies=bodies, seconds=seconds)
 
@@ -113,10 +135,15 @@ def reduce(
     solver
         Of the bodies' linear systems: 'auto' or a name in contactopt.bodies.solvers.SOLVERS.
 
+    Returns
+    -------
+    InterfaceProblem
+        Its compliance, gaps, motions and resultants, with the law of the scene.
+
     Raises
     ------
     InputError
-        On input that cannot be modelled: unknown boundaries, a body that is free to move, nodes that do not match.
+        On input that cannot be modelled: unknown boundaries, nodes that do not match.
     """
     return reduce_bodies(scene, elements, zone, Q, solver).problem
 
@@ -127,11 +154,28 @@ def reduce_bodies(
     zone: float | None = None,
     Q: str = "auto",
     solver: str = "auto",
-    coupling: str = "matching",
+    coupling: str | None = None,
 ) -> Reduction:
-    """As reduce(), keeping the bodies for recovery.
+    """Reduce a scene to its interface problem and keep the bodies, from which fields are recovered.
 
-    The bodies are made solvable at the same time. `coupling` is a name in contactopt.interface.coupling.COUPLINGS.
+    Where the solvers of the bodies allow it, the bodies are factorised at the same time.
+
+    Parameters
+    ----------
+    scene, elements, zone, Q, solver
+        As for reduce().
+    coupling
+        A name in contactopt.interface.coupling.COUPLINGS, for all pairs of surfaces; by default each has its own.
+
+    Returns
+    -------
+    Reduction
+        The interface problem with the bodies, the coupling and the seconds that each phase took.
+
+    Raises
+    ------
+    InputError
+        As reduce().
     """
     if Q not in FORMS:
         raise InputError(f"unknown form of Q {Q!r}; choose from {', '.join(FORMS)}.")
@@ -140,63 +184,140 @@ def reduce_bodies(
     seconds: dict[str, float] = {}
     start = time.perf_counter()
     assembled = [assemble(scene, part, elements, zone) for part in scene.parts]
-    coupled = couple(scene, assembled[0], assembled[1], coupling)
-    maps = (coupled.upper, -coupled.lower)
+    named = {body.name: body for body in assembled}
+    sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
+    coupled = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in zip(scene.pairs, sides))
+    maps = tuple(_map_of(body, sides, coupled) for body in assembled)
     seconds["assemble"] = time.perf_counter() - start
 
     start = time.perf_counter()
+    n = maps[0].shape[0]
     if Q == "auto":
         contact, largest = (max(getattr(b, size) for b in assembled) for size in ("interface_unknowns", "unknowns"))
+        if _filling(maps) ** 0.5 > MOST_EXPLICIT:
+            contact = MOST_EXPLICIT + 1
         Q = form_of(contact, largest, scene.dim, any(b.iterates(solver) for b in assembled))
-    log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, maps[0].shape[0])
+    log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, n)
     if Q == "explicit":
-        check_dense(maps[0].shape[0])
+        check_dense(round(_filling(maps) ** 0.5))
     bodies = each(lambda body: body.prepare(solver, Q == "explicit"), assembled)
     seconds["factorise"] = time.perf_counter() - start
 
     start = time.perf_counter()
     q, V, s = _linear_terms(bodies, maps, coupled)
-    made = _operator(bodies, maps, coupled) if Q == "implicit" else _array(bodies, maps)
-    areas, points = coupled.areas, coupled.positions
-    law = make_law(scene.law, scene.mu, areas, points)
-    problem = InterfaceProblem(made, q, law, V, s, areas, points, chart=coupled.chart)
+    made = _operator(bodies, maps, coupled) if Q == "implicit" else _entries(bodies, maps)
+    areas = np.concatenate([part.areas for part in coupled])
+    points = np.concatenate([part.positions for part in coupled], axis=1)
+    pairs = _pairs(scene, coupled)
+    chart = pairs[0].chart if len(pairs) == 1 else None
+    law, names = _law(scene.pairs, coupled), _names(bodies)
+    problem = InterfaceProblem(made, q, law, V, s, areas, points, chart, pairs, names)
     seconds["compliance"] = time.perf_counter() - start
     return Reduction(scene, problem, bodies, maps, coupled, seconds)
 
 
-def _operator(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], coupling: Coupling) -> InterfaceOperator:
+def _map_of(
+    body: AssembledBody, sides: Sequence[tuple[AssembledBody, AssembledBody]], couplings: Sequence[Coupling]
+) -> sp.csr_matrix:
+    """B (k dim, n) of a body: the maps of the pairs that it takes part in, with their signs, and zeros elsewhere."""
+    blocks: list[sp.csr_matrix | int] = []
+    width = 0
+    for (upper, lower), made in zip(sides, couplings):
+        rows = made.frames.shape[0] * made.frames.shape[1]
+        own = made.upper if body is upper else -made.lower if body is lower else None
+        blocks.append(rows if own is None else own)
+        width = width if own is None else own.shape[1]
+    filled = [sp.csr_matrix((block, width)) if isinstance(block, int) else block for block in blocks]
+    return filled[0] if len(filled) == 1 else sp.csr_matrix(sp.vstack(filled, format="csr"))
+
+
+def _pairs(scene: Scene, couplings: Sequence[Coupling]) -> tuple[Pair, ...]:
+    ends = np.cumsum([0, *(len(made.gap) for made in couplings)])
+    named = zip(scene.pairs, couplings, ends[:-1], ends[1:])
+    return tuple(Pair(pair.name, int(first), int(last), made.chart) for pair, made, first, last in named)
+
+
+def _law(pairs: Sequence[Contact], couplings: Sequence[Coupling]) -> Law:
+    """One law for all contacts, from those of the pairs."""
+    laws = [make_law(pair.law, pair.mu, made.areas, made.positions) for pair, made in zip(pairs, couplings)]
+    if len(laws) == 1:
+        return laws[0]
+    ends = np.cumsum([0, *(law.contacts for law in laws)])
+    return join([(law, np.arange(first, last)) for law, first, last in zip(laws, ends[:-1], ends[1:])])
+
+
+def _names(bodies: Sequence[Body]) -> tuple[str, ...]:
+    """What each multiplier is, for messages."""
+    return tuple(f"body '{body.name}': {name}" for body in bodies for name in body.motion_names)
+
+
+def _rows(B: sp.csr_matrix) -> np.ndarray:
+    """The rows of a map that are not empty; all of them where most are not, so that nothing needs to be picked out."""
+    filled = np.flatnonzero(np.diff(B.indptr))
+    return filled if 4 * len(filled) < 3 * B.shape[0] else np.arange(B.shape[0])
+
+
+def _operator(
+    bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
+) -> InterfaceOperator:
     """Q by its products. Its diagonal is an estimate, which takes one product."""
     moved = [body.moved(B) for body, B in zip(bodies, maps)]
-    terms = [(body.product(B), body.parallel) for body, B, moves in zip(bodies, maps, moved) if moves.any()]
-    parallel = [marked for _, marked in terms]
+    moving = [(body, B, _rows(B)) for body, B, moves in zip(bodies, maps, moved) if moves.any()]
+    terms = [(body.product(B[rows]), rows, body.parallel) for body, B, rows in moving]
+    parallel = [marked for *_, marked in terms]
 
     def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
-        return np.asarray(sum(each(lambda term: term[0](X, accuracy), terms, parallel), np.zeros(X.shape)))
+        def moves(term: tuple[Product, np.ndarray, bool]) -> tuple[np.ndarray, np.ndarray]:
+            """The columns that load a body at all, and what they make of it."""
+            act, rows, _ = term
+            load = X[rows]
+            columns = np.flatnonzero(load.any(axis=0)) if len(couplings) > 1 else np.arange(X.shape[1])
+            return columns, act(load[:, columns], accuracy) if len(columns) else load[:, columns]
 
-    weights = nodal_weights(coupling.chart, coupling.areas)
+        out = np.zeros(X.shape)
+        for (_, rows, _), (columns, own) in zip(terms, each(moves, terms, parallel)):
+            out[np.ix_(rows, columns)] += own
+        return out
+
+    weights = [nodal_weights(made.chart, made.areas) for made in couplings]
     diagonal = estimate_diagonal(product, weights, np.any(moved, axis=0))
     complete, iterative = all(body.complete for body in bodies), any(body.iterative for body in bodies)
-    entries = (lambda: _array(bodies, maps)) if complete else None
+    entries = (lambda: dense(_entries(bodies, maps))) if complete else None
     coupled = coupled_form(bodies, maps) if iterative else None
     return InterfaceOperator(product, diagonal, entries, None, iterative, coupled)
 
 
-def _array(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarray:
-    """Q as an array, symmetric to the last digit."""
+def _filling(maps: Sequence[sp.csr_matrix]) -> int:
+    """Number of the entries of Q between contacts that share a body."""
+    return min(sum(len(_rows(B)) ** 2 for B in maps), maps[0].shape[0] ** 2)
+
+
+def _entries(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarray | sp.csr_array:
+    """Q by its entries, symmetric to the last digit: an array, or sparse rows where most pairs share no body."""
     n = maps[0].shape[0]
-    terms = (body.compliance(B) for body, B in zip(bodies, maps) if body.moved(B).any())
-    Q = next(terms, np.zeros((n, n)))
-    for term in terms:
-        Q += term
+    thin = _filling(maps) < SPARSE * n**2
+    Q = sp.csr_array((n, n)) if thin else np.zeros((n, n))
+    for body, B in zip(bodies, maps):
+        if not body.moved(B).any():
+            continue
+        rows = _rows(B)
+        if thin:
+            place = np.repeat(rows, len(rows)), np.tile(rows, len(rows))
+            Q = Q + sp.csr_array((body.compliance(B[rows]).ravel(), place), (n, n))
+        elif len(rows) == n:
+            Q += body.compliance(B)
+        else:
+            Q[np.ix_(rows, rows)] += body.compliance(B[rows])
     return Q
 
 
 def _linear_terms(
-    bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], coupling: Coupling
+    bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """q (k, dim), V (k dim, p) and s (p,)."""
-    q = np.zeros(coupling.frames.shape[:2])
-    q[:, 0] = coupling.gap
+    gap = np.concatenate([made.gap for made in couplings])
+    q = np.zeros((len(gap), maps[0].shape[0] // max(len(gap), 1)))
+    q[:, 0] = gap
     for body, B in zip(bodies, maps):
         q += (B @ body.at_rest).reshape(q.shape)
     V = np.concatenate([B @ body.motions for body, B in zip(bodies, maps)], axis=1)

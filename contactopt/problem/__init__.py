@@ -3,23 +3,31 @@
 Nothing here, or below in what it imports, knows finite elements.
 """
 
-from contactopt.problem.certificate import balance_residual, fit_multipliers, natural_map_residual
+from contactopt.problem.certificate import balance_residual, fit_multipliers, natural_map_residual, siconos_residual
 from contactopt.problem.chart import Chart
+from contactopt.problem.feasibility import Infeasible, infeasibility
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.laws import LAWS, Law
+from contactopt.problem.pairs import Pair, alone, part_of
 from contactopt.problem.scaling import Scales, dimensionless
 from contactopt.problem.solution import Solution, Status
 
 __all__ = [
     "LAWS",
     "Chart",
+    "Infeasible",
     "InterfaceProblem",
     "Law",
+    "Pair",
     "Scales",
     "Solution",
     "Status",
+    "alone",
     "balance_residual",
     "dimensionless",
     "fit_multipliers",
+    "infeasibility",
     "natural_map_residual",
+    "part_of",
+    "siconos_residual",
 ]

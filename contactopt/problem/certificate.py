@@ -1,4 +1,38 @@
-"""The certificate of every answer: how far reactions are from solving an interface problem."""
+"""The certificate of every answer: how far reactions are from solving an interface problem.
+
+Two yardsticks of the problem and of the answer make the certificate dimensionless, a force F and a length L. With
+d = Q r, w = q + V lambda and u = d + w, |.| the length of one contact's block and F0 the largest |r_i|:
+
+    L = the largest of  min(1, |r_i| / (1e-6 F0)) |d_i|   (displacements that the forces make where they act),
+                        max(-w_n, 0)                      (overlaps that the forces must remove), and
+                        min |w_n|                         (the narrowest gap);
+    F = min(F0, max(L / c, S)), at least 1e-5 max(L / c, S), with the mean compliance c = sum |r_i| c_i / sum |r_i| and
+        the force on a plate S = max_j |s_j| / max_i |V_ij|; c_i is the mean of the diagonal of Q over block i.
+
+L does not grow with the gaps of distant contacts, which stay open. F does not grow with forces that move nothing (the
+null space of Q): a force counts only as far as it makes a displacement or holds a plate.
+
+With the contact law's map P (for Coulomb friction the map of Alart and Curnier) the error of contact i is
+
+    e_i = |r_i - P(r_i - rho_i u_i)| / F,       rho_i = (F / L) min(max(c / c_i, 1), 1e4),
+
+which is zero at all contacts exactly at the solutions. A contact much stiffer than the mean has a larger rho_i, because
+there a small error of the displacement is a large error of the force. The certificate is the largest of all e_i, of
+(|r_t| - mu r_n) / F, and of the relative errors |V_j' r + s_j| / max(|s_j|, max_i |V_ij| F) of the balance.
+
+What a certificate of at most tol promises for Coulomb friction, at every contact:
+
+    penetration          u_n >= -tol L
+    tension              r_n >= -tol F
+    complementarity      r_n <= tol F  or  u_n <= tol L
+    friction bound       |r_t| <= mu r_n + tol F
+    sticking             |u_t| <= tol L  where  |r_t| < mu r_n - (1 + mu) tol F
+    slip direction       friction across the direction of slip is at most  tol F (1 + mu r_n L / (F |u_t|))
+    balance              |V_j' r + s_j| <= tol max(|s_j|, max_i |V_ij| F)
+
+The certificate does not bound the distance to a solution: where Q is nearly singular, forces that differ much have
+displacements that differ little. It is the same in all units, and costs one product with Q.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +43,11 @@ import numpy as np
 from contactopt.errors import InputError
 from contactopt.problem.cones import split
 from contactopt.problem.interface_problem import InterfaceProblem
+from contactopt.problem.operators import diagonal
+
+ACTS = 1e-6  # share of the largest force from which on a contact's displacement counts fully in L
+DUST = 1e-5  # share of the force that closes the gaps below which forces are rounding
+STIFFEST = 1e4  # largest rho_i, over the mean one
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,86 +62,184 @@ class Moved:
     accuracy: float
 
 
-@np.errstate(over="ignore", invalid="ignore")  # numbers beyond the range of floats are no solution
+@dataclass(frozen=True)
+class Yardsticks:
+    """What errors are compared with: a force F, a length L, and the steps rho (k,) of the natural map [force/length]."""
+
+    force: float
+    length: float
+    rho: np.ndarray
+
+
+@np.errstate(all="ignore")  # numbers beyond the range of floats are no solution
 def natural_map_residual(
     problem: InterfaceProblem,
     reactions: np.ndarray,
     multipliers: np.ndarray | None = None,
-    rho: float | None = None,
     moved: Moved | None = None,
 ) -> float:
-    """How far reactions are from a solution, dimensionless: the certificate of every answer.
+    """How far reactions are from a solution, dimensionless: the certificate, as in the head of this module.
 
-    With K the product of the law's sets of forces, g its opening (Coulomb: the friction cones and mu |u_t|) and
-    w = q + V lambda,
-        |r - proj_K(r - rho (u + g n))| / max(|r|, rho |w|, rho |u|),
-    which is zero exactly at the solutions (contactopt.problem.laws).
-    rho = 1 without a plate is the measure of Siconos and FCLib, which depends on units. By default rho [force/length]
-    makes |r| and the smaller of rho |w|, rho |Q r| comparable, so that no choice of units can hide an error: the
-    result is the same in all units. A relative error of the balance V' r + s = 0 counts as well: the larger is given.
+    Parameters
+    ----------
+    problem : the interface problem
+    reactions : (k, dim) forces, normal first [force]
+    multipliers : (p,) displacements of the plates [length]; None: those that fit best (`fit_multipliers`)
+    moved : Q r where it is known already; then its accuracy counts as well
 
-    reactions    (k, dim) forces, normal first
-    multipliers  (p,) displacements of the plates; None: those that fit best, by least squares
-    moved        Q r where it is known already; then its accuracy counts as well, and the largest of all is given
-    Raises InputError on shapes that do not fit; returns inf if a reaction is not finite.
-    Source: Acary, Bremond, Huber (2018), On solving contact problems with Coulomb friction: formulations and
-    numerical comparisons.
+    Returns
+    -------
+    The largest relative error [-], 0 at a solution; inf if a number is not finite.
+
+    Raises InputError on shapes that do not fit.
+    Source: Alart, Curnier (1991), A mixed formulation for frictional contact problems prone to Newton like solution
+    methods, for the map; the yardsticks are those of the head of this module.
     """
-    r = np.asarray(reactions, dtype=float)
-    if r.shape != problem.q.shape:
-        raise InputError(f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}.")
-    if not np.all(np.isfinite(r)):
+    r, lam = _checked(problem, reactions, multipliers)
+    if not (np.all(np.isfinite(r)) and np.all(np.isfinite(lam))):
         return np.inf
-    lam = fit_multipliers(problem, r) if multipliers is None else np.asarray(multipliers, dtype=float)
-    if lam.shape != problem.s.shape:
-        raise InputError(f"multipliers must have shape {problem.s.shape}; got {lam.shape}.")
-    if not np.all(np.isfinite(lam)):
-        return np.inf
+    if len(r) == 0:
+        return balance_residual(problem, r)
+    d = np.asarray(problem.Q @ r.ravel() if moved is None else moved.value).reshape(r.shape)
     w = problem.q + (problem.V @ lam).reshape(r.shape)
-    under = (problem.Q @ r.ravel() if moved is None else moved.value).reshape(r.shape)
-    u = under + w
-    if rho is None:
-        rho = balanced_step(r, under, u, w)
-    size = max(np.linalg.norm(r), rho * np.linalg.norm(w), rho * np.linalg.norm(u))
-    gap = 0.0
-    if size != 0:
-        gap = float(np.linalg.norm(r - problem.law.natural_map(r, u, rho)) / size)
-    worst = np.max([gap, balance_residual(problem, r), 0.0 if moved is None else moved.accuracy])
-    return float(worst) if np.isfinite(worst) else np.inf
+    u = d + w
+    measure = yardsticks(problem, r, d, w)
+    errors = np.linalg.norm(r - problem.law.project(r - measure.rho[:, None] * u)[0], axis=1)
+    r_n, r_t = split(r)
+    beyond = np.linalg.norm(r_t, axis=1) - problem.law.bound(r_n)
+    worst = max(
+        float(np.max(errors)) / measure.force,
+        float(np.max(beyond)) / measure.force,
+        balance_residual(problem, r, measure.force),
+        0.0 if moved is None else moved.accuracy,
+    )
+    return worst if np.isfinite(worst) else np.inf
 
 
-def balanced_step(r: np.ndarray, moved: np.ndarray, u: np.ndarray, w: np.ndarray) -> float:
-    """rho = |r| / min(max(|u|, |w|), 1e6 |Q r|): the step of the natural map at which no choice of units hides an error.
+def yardsticks(problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.ndarray) -> Yardsticks:
+    """The force F, the length L and the steps rho of the certificate, as in the head of this module.
 
-    The second term counts where r is next to nothing (open contact): there |r| alone says nothing about the scale.
+    r (k, dim) are the forces, d = Q r and w = q + V lambda; all finite.
     """
-    force, change, *distances = (float(np.linalg.norm(x)) for x in (r, moved, u, w))
-    distance = min(max(distances), 1e6 * change)
-    return force / distance if force > 0 and distance > 0 else 1.0
+    size = np.linalg.norm(r, axis=1)
+    largest = float(size.max())
+    weight = np.minimum(1.0, size / (ACTS * largest)) if largest > 0 else np.zeros(len(r))
+    overlap = np.where(problem.law.lowest < 0, np.abs(w[:, 0]), np.maximum(-w[:, 0], 0.0))
+    length = max(
+        float(np.max(weight * np.linalg.norm(d, axis=1))), float(overlap.max()), float(np.min(np.abs(w[:, 0])))
+    )
+    if length == 0:
+        length = _least_displacement(r, d + w)
+    compliance = _compliances(problem)
+    moves = compliance > 0
+    shares = np.where(moves, size, 0.0) if np.any(size[moves] > 0) else moves.astype(float)
+    mean = float(shares @ compliance / shares.sum()) if shares.any() else 0.0
+    natural = max(length / mean if mean > 0 else 0.0, plate_force(problem))
+    force = max(min(largest, natural), DUST * natural) if natural > 0 else largest
+    force = force or 1.0  # no force, and none that would make a displacement: any number serves
+    if length == 0:
+        return Yardsticks(force, 0.0, np.zeros(len(r)))
+    stiff = np.clip(np.divide(mean, compliance, out=np.ones(len(r)), where=moves), 1.0, STIFFEST)
+    return Yardsticks(force, length, stiff * (force / length))
 
 
-def balance_residual(problem: InterfaceProblem, reactions: np.ndarray) -> float:
-    """Largest relative error of V' r + s = 0 [-]."""
+def plate_force(problem: InterfaceProblem) -> float:
+    """S = max_j |s_j| / max_i |V_ij|, the force on a plate [force]; 0 without a plate."""
     if len(problem.s) == 0:
         return 0.0
-    error = np.abs(problem.V.T @ reactions.ravel() + problem.s)
-    size = np.abs(problem.V).T @ np.abs(reactions.ravel()) + np.abs(problem.s)
-    return float(np.max(np.divide(error, size, out=np.zeros_like(error), where=size > 0)))
+    reach = np.abs(problem.V).max(axis=0, initial=0.0)
+    return float(np.max(np.divide(np.abs(problem.s), reach, out=np.zeros(len(reach)), where=reach > 0)))
+
+
+def _compliances(problem: InterfaceProblem) -> np.ndarray:
+    """(k,) mean of the positive diagonal entries of each block; 0 where there is none above rounding."""
+    entries = np.asarray(diagonal(problem.Q), dtype=float).reshape(problem.q.shape)
+    entries = np.where(entries > 1e-13 * entries.max(initial=0.0), entries, 0.0)
+    count = np.count_nonzero(entries, axis=1)
+    return np.asarray(entries.sum(axis=1) / np.maximum(count, 1))
+
+
+def _least_displacement(r: np.ndarray, u: np.ndarray) -> float:
+    """The least displacement that is an error or may be one: of a contact that bears force or overlaps. 0 without any."""
+    size = np.linalg.norm(u, axis=1)
+    counts = ((np.any(r != 0, axis=1)) | (u[:, 0] < 0)) & (size > 0)
+    return float(size[counts].min()) if counts.any() else 0.0
+
+
+def balance_residual(problem: InterfaceProblem, reactions: np.ndarray, force: float | None = None) -> float:
+    """Largest relative error of V' r + s = 0: |V_j' r + s_j| / max(|s_j|, max_i |V_ij| F) [-].
+
+    force  F; None: the largest |r_i|
+    """
+    if len(problem.s) == 0:
+        return 0.0
+    r = np.asarray(reactions, dtype=float)
+    if force is None:
+        force = float(np.linalg.norm(r, axis=1).max(initial=0.0))
+    error = np.abs(problem.V.T @ r.ravel() + problem.s)
+    size = np.maximum(np.abs(problem.s), np.abs(problem.V).max(axis=0, initial=0.0) * force)
+    return float(
+        np.max(np.where(error > 0, np.divide(error, size, out=np.full_like(error, np.inf), where=size > 0), 0))
+    )
+
+
+def siconos_residual(problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray | None = None) -> float:
+    """The measure that Siconos and the FCLib collection compare methods by; for comparison, not for a verdict.
+
+    With K the product of the friction cones it is |r - proj_K(r - (u + mu |u_t| n))| / max(|q|, |r|, |u|), where
+    |.| is the norm of all components together. It depends on units, and forces that move nothing or one distant open
+    contact make it as small as one likes. The balance of a plate is not in it.
+
+    Parameters
+    ----------
+    problem : the interface problem
+    reactions : (k, dim) forces, normal first [force]
+    multipliers : (p,) displacements of the plates [length]; None: those that fit best (`fit_multipliers`)
+
+    Returns
+    -------
+    The residual [-], 0 at a solution.
+
+    Source: Acary, Bremond, Huber (2018), On solving contact problems with Coulomb friction: formulations and
+    numerical comparisons; De Saxce, Feng (1998) for the map.
+    """
+    r, lam = _checked(problem, reactions, multipliers)
+    u = problem.displacements(r, lam)
+    size = max(np.linalg.norm(problem.q), np.linalg.norm(r), np.linalg.norm(u))
+    error = np.linalg.norm(r - problem.law.natural_map(r, u, 1.0))
+    return float(error / size) if size > 0 else 0.0
 
 
 def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray:
-    """The lambda that fits the reactions best: least squares on the components whose displacement must vanish.
+    """The lambda (p,) that fits the reactions best: least squares on the components whose displacement must vanish.
 
     Those are u_n where r_n > 0 and u_t where |r_t| is below the friction bound. With none, zeros.
     """
     if len(problem.s) == 0:
         return np.zeros(0)
-    r_n, r_t = split(reactions)
-    size = np.abs(r_n).max(initial=0.0)
-    pressed = np.abs(r_n) > 1e-8 * size
+    r_n, r_t = split(np.asarray(reactions, dtype=float))
+    pressed = np.abs(r_n) > 1e-8 * np.abs(r_n).max(initial=0.0)
     stuck = pressed & (np.linalg.norm(r_t, axis=1) < (1 - 1e-6) * problem.law.bound(r_n))
     rows = np.concatenate([pressed[:, None], np.repeat(stuck[:, None], problem.dim - 1, axis=1)], axis=1).ravel()
     if not rows.any():
         return np.zeros(len(problem.s))
-    u = (problem.Q @ reactions.ravel())[rows] + problem.q.ravel()[rows]
-    return np.asarray(np.linalg.lstsq(problem.V[rows], -u, rcond=None)[0])
+    u = (problem.Q @ np.ravel(reactions))[rows] + problem.q.ravel()[rows]
+    V = problem.V[rows]
+    columns = np.linalg.norm(V, axis=0)
+    columns[columns == 0] = 1.0
+    return np.asarray(np.linalg.lstsq(V / columns, -u, rcond=None)[0] / columns)
+
+
+def _checked(
+    problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    r = np.asarray(reactions, dtype=float)
+    if r.shape != problem.q.shape:
+        raise InputError(f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}.")
+    if multipliers is None:
+        lam = fit_multipliers(problem, r) if np.all(np.isfinite(r)) else np.zeros(len(problem.s))
+    else:
+        lam = np.asarray(multipliers, dtype=float)
+    if lam.shape != problem.s.shape:
+        raise InputError(f"multipliers must have shape {problem.s.shape}; got {lam.shape}.")
+    return r, lam

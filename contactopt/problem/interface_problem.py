@@ -7,8 +7,8 @@
 
 One block per contact node, normal component first. r is the force on the upper body, r_n >= 0 in compression;
 u is the relative displacement plus the initial gap, so that u_n is the gap that remains. In the paper's letters
-R_n = -r_n and w_n - d = -u_n. V holds the rigid motions of bodies that are held only by a plate under a total force:
-lambda is the plate's displacement, s collects minus what r must balance.
+R_n = -r_n and w_n - d = -u_n. V holds the rigid motions that nothing but contact resists, of plates under a total force
+and of bodies without enough supports: lambda is how far each of them goes, s collects minus what r must balance.
 """
 
 from __future__ import annotations
@@ -20,13 +20,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.problem.laws import Law
 from contactopt.problem.laws.coulomb import Coulomb
-from contactopt.problem.operators import Interface, InterfaceOperator
+from contactopt.problem.operators import Interface, InterfaceOperator, asymmetry, dense, diagonal, row_sizes, sparse
+from contactopt.problem.pairs import Pair
+
+SYMMETRIC = 1e-2  # largest |Q - Q'|, over the largest |Q|, that counts as rounding of the code that wrote Q
 
 logger = logging.getLogger(__name__)
 
@@ -37,18 +41,23 @@ LARGEST = 8e9  # bytes of a Q that is formed in full from its products
 class InterfaceProblem:
     """Contact at k nodes in `dim` dimensions, as in the head of this module.
 
-    Q            (k dim, k dim) compliance, symmetric positive semidefinite [length / force]: an array, or an
-                 InterfaceOperator that knows it by its products only
+    Q            (k dim, k dim) compliance [length / force]: an array, a scipy sparse matrix (kept as csr_array), or an
+                 InterfaceOperator that knows it by its products only. Elastic bodies make it symmetric positive
+                 semidefinite; files of other codes may hold an unsymmetric one, which is solved as it stands by the
+                 methods that need no symmetry (`symmetric`)
     q            (k, dim) displacement at r = 0, lambda = 0 [length]; q_n holds the initial gap
     law          a Law of contactopt.problem.laws, or friction coefficients, one number or (k,), which mean Coulomb's law;
                  the keyword `mu` may be given in its place
-    V, s         (k dim, p) rigid motions and (p,) resultants [force]; p = 0 without a plate
+    V, s         (k dim, p) rigid motions and (p,) resultants [force]; p = 0 where all bodies are held
     areas        (k,) nodal areas, force / area = traction; ones by default
     coordinates  (d, k) positions of the nodes in space, for output only; 0, 1, 2, ... by default
-    chart        the nodes' places on the contact surface; by default read from the coordinates (Chart.of_points)
-    Raises InputError on wrong shapes, numbers that are not finite or not real, negative mu, V without s, an unsymmetric Q or one with a negative
-    diagonal (an indefinite Q is not looked for: its answers are certified like any other; an operator is taken at its
-    word).
+    chart        the nodes' places on the contact surface; by default read from the coordinates (Chart.of_points). With
+                 several pairs of surfaces each of them has its own chart, and this one is only an overview
+    pairs        the pairs of surfaces, as consecutive contacts 0 ... k - 1; by default one
+    motions      (p,) what each column of V is, for messages; may be left out
+    Raises InputError on wrong shapes, numbers that are not finite or not real, negative mu, V without s, or a Q with a
+    negative diagonal (an indefinite Q is not looked for: its answers are certified like any other; an operator is taken at
+    its word).
     """
 
     Q: Interface
@@ -59,6 +68,8 @@ class InterfaceProblem:
     areas: np.ndarray
     coordinates: np.ndarray
     chart: Chart
+    pairs: tuple[Pair, ...]
+    motions: tuple[str, ...]
 
     def __init__(
         self,
@@ -70,13 +81,17 @@ class InterfaceProblem:
         areas: Any = (),
         coordinates: Any = (),
         chart: Chart | None = None,
+        pairs: tuple[Pair, ...] = (),
+        motions: tuple[str, ...] = (),
         *,
         mu: Any = None,
     ):
         if (law is None) == (mu is None):
             raise InputError("give either a law or a friction coefficient mu.")
         given = {"Q": Q, "q": q, "law": mu if law is None else law, "V": V, "s": s, "areas": areas}
-        for name, value in (given | {"coordinates": coordinates, "chart": chart}).items():
+        for name, value in (
+            given | {"coordinates": coordinates, "chart": chart, "pairs": pairs, "motions": motions}
+        ).items():
             object.__setattr__(self, name, value)
         self._check()
 
@@ -100,22 +115,28 @@ class InterfaceProblem:
             "coordinates": (places, (len(places), k)),
         }
         for name, (value, shape) in arrays.items():
-            array = self.Q if name == "Q" and implicit else real_array(name, value)
+            array = self.Q if name == "Q" and implicit else _numbers(name, value)
             if array.shape != shape:
                 raise InputError(f"{name} must have shape {shape}; got {array.shape}.")
             if array is self.Q:
                 continue
-            array.setflags(write=False)
+            (array.data if sp.issparse(array) else array).setflags(write=False)
             object.__setattr__(self, name, array)
         if self.chart is None:
             object.__setattr__(self, "chart", Chart.of_points(self.coordinates, dim))
         elif self.chart.places.shape != (dim - 1, k):
             raise InputError(f"the chart must have places of shape {(dim - 1, k)}; got {self.chart.places.shape}.")
+        pairs = self.pairs
+        if len(pairs) < 2:  # the only pair is all of the problem, whatever was replaced in it
+            pairs = (Pair(pairs[0].name if pairs else "contact", 0, k, self.chart),)
+        if [pair.first for pair in pairs] + [k] != [0] + [pair.last for pair in pairs]:
+            raise InputError(f"the pairs of surfaces must follow each other from contact 0 to contact {k - 1}.")
+        object.__setattr__(self, "pairs", pairs)
+        if self.motions and len(self.motions) != len(self.s):
+            raise InputError(f"motions must name the {len(self.s)} columns of V; got {len(self.motions)} names.")
         if isinstance(self.Q, InterfaceOperator):
             return
-        if np.abs(self.Q - self.Q.T).max(initial=0.0) > 1e-2 * np.abs(self.Q).max(initial=0.0):
-            raise InputError("Q must be symmetric (to 1 %); check the order of its rows and columns.")
-        if np.diag(self.Q).min(initial=0.0) < -1e-12 * np.abs(self.Q).max(initial=0.0):
+        if diagonal(self.Q).min(initial=0.0) < -1e-12 * row_sizes(self.Q).max(initial=0.0):
             raise InputError("Q must be positive semidefinite, but it has a negative diagonal entry; check its sign.")
 
     @property
@@ -132,18 +153,27 @@ class InterfaceProblem:
         return self.law.coefficient
 
     @cached_property
+    def symmetric(self) -> bool:
+        """Whether Q is symmetric to 1 %: methods that minimise an energy need it, and use (Q + Q') / 2."""
+        return asymmetry(self.Q) <= SYMMETRIC
+
+    @cached_property
     def fingerprint(self) -> str:
         """Digest of the problem's data, for caching and for naming it in tables."""
         digest = hashlib.sha256(self.law.digest)
         implicit = isinstance(self.Q, InterfaceOperator)
-        probe = self.Q @ np.random.default_rng(0).normal(size=self.q.size) if implicit else self.Q
-        for array in (probe, self.q, self.V, self.s):
+        if implicit:
+            known = [self.Q @ np.random.default_rng(0).normal(size=self.q.size)]
+        else:  # the same for an array and for sparse rows
+            rows = sparse(self.Q)
+            known = [rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data]
+        for array in (*known, self.q, self.V, self.s):
             digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()[:16]
 
     def explicit(self) -> InterfaceProblem:
         """The same problem with Q an array; InputError if that is larger than LARGEST bytes."""
-        if not isinstance(self.Q, InterfaceOperator):
+        if isinstance(self.Q, np.ndarray):
             return self
         size = 8 * self.q.size**2
         if size > LARGEST:
@@ -152,8 +182,20 @@ class InterfaceProblem:
                 "use the method 'newton', or 'alternating' with the backend 'pcg', which need products with Q only."
             )
         logger.info("forming Q in full: %d unknowns, %.3g MB", self.q.size, size / 1e6)
-        return replace(self, Q=self.Q.to_dense())
+        return replace(self, Q=dense(self.Q))
 
     def displacements(self, reactions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """u = Q r + V lambda + q, (k, dim) [length]."""
         return (self.Q @ reactions.ravel() + self.V @ multipliers).reshape(self.q.shape) + self.q
+
+
+def _numbers(name: str, value: Any) -> Any:
+    """The value as a real finite array of its own, or a sparse Q as sparse rows; InputError if it is neither."""
+    if name != "Q" or not sp.issparse(value):
+        return real_array(name, value)
+    if np.iscomplexobj(value):
+        raise InputError("Q must be real; got complex numbers.")
+    rows = sparse(value)
+    if not np.all(np.isfinite(rows.data)):
+        raise InputError("Q holds a number that is not finite.")
+    return rows

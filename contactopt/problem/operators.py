@@ -1,15 +1,18 @@
 """The interface operator Q known by its products: what every method needs that never looks at an entry of Q.
 
 A product costs one solve per body; the entries of Q cost one per interface unknown. Methods that need them ask for
-`dense(Q)`. All functions here take both forms of Q, an array and an InterfaceOperator.
+`dense(Q)`. All functions here take the three forms of Q: an array, a scipy sparse matrix in compressed rows (csr_array),
+and an InterfaceOperator.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator
 
 from contactopt.errors import InputError
@@ -122,7 +125,15 @@ class InterfaceOperator(LinearOperator):
         return part
 
 
-Interface = np.ndarray | InterfaceOperator
+Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or InterfaceOperator
+
+
+def sparse(Q: object) -> sp.csr_array:
+    """Any scipy sparse matrix as compressed rows of floats with sorted columns, duplicates summed, in memory of its own."""
+    rows = sp.csr_array(Q, dtype=float, copy=True)
+    rows.sum_duplicates()
+    rows.eliminate_zeros()
+    return rows
 
 
 def check_dense(n: int) -> None:
@@ -145,25 +156,49 @@ def check_dense(n: int) -> None:
 
 def dense(Q: Interface) -> np.ndarray:
     """Q as an array (n, n)."""
-    return Q.to_dense() if isinstance(Q, InterfaceOperator) else Q
+    if isinstance(Q, InterfaceOperator):
+        return Q.to_dense()
+    return np.asarray(Q.toarray()) if sp.issparse(Q) else Q
 
 
 def diagonal(Q: Interface) -> np.ndarray:
     """The diagonal of Q (n,), or the operator's estimate of it."""
-    return Q.diagonal if isinstance(Q, InterfaceOperator) else np.diag(Q)
+    if isinstance(Q, InterfaceOperator):
+        return Q.diagonal
+    return np.asarray(Q.diagonal())
+
+
+def row_sizes(Q: np.ndarray | sp.csr_array) -> np.ndarray:
+    """(n,) largest |Q_ij| of each row."""
+    if sp.issparse(Q):
+        return np.asarray(abs(Q).max(axis=1).toarray()).ravel() if Q.shape[0] else np.zeros(0)
+    return np.asarray(np.abs(Q).max(axis=1, initial=0.0))
+
+
+def asymmetry(Q: Interface) -> float:
+    """max |Q - Q'| / max |Q| [-]; an operator is symmetric."""
+    if isinstance(Q, InterfaceOperator):
+        return 0.0
+    if sp.issparse(Q):
+        size = float(np.abs(Q.data).max(initial=0.0))
+        return float(np.abs((Q - Q.T).data).max(initial=0.0)) / size if size > 0 else 0.0
+    size = float(np.abs(Q).max(initial=0.0))
+    return float(np.abs(Q - Q.T).max(initial=0.0)) / size if size > 0 else 0.0
 
 
 def held(Q: Interface) -> np.ndarray:
     """(n,) mask of the components that cannot move: coupled to no other component."""
     if isinstance(Q, InterfaceOperator):
         return Q.held
-    size = np.abs(Q)
-    coupling = size.sum(axis=1) - np.diag(size)
-    return np.asarray(coupling <= NOISE * size.max(initial=0.0))
+    size = abs(Q)
+    coupling = np.asarray(size.sum(axis=1)).ravel() - size.diagonal()
+    return np.asarray(coupling <= NOISE * row_sizes(Q).max(initial=0.0))
 
 
 def shifted(Q: Interface, added: np.ndarray) -> Interface:
     """Q + diag(added), added (n,); products count with those of Q."""
+    if sp.issparse(Q):
+        return sp.csr_array(Q + sp.diags_array(added))
     if not isinstance(Q, InterfaceOperator):
         return Q + np.diag(added)
     sum_ = Q.scaled(1.0, added)
@@ -173,6 +208,8 @@ def shifted(Q: Interface, added: np.ndarray) -> Interface:
 
 def block(Q: Interface, unknowns: np.ndarray) -> Interface:
     """Q on some unknowns alone."""
+    if sp.issparse(Q):
+        return sp.csr_array(Q[unknowns][:, unknowns])
     return Q.block(unknowns) if isinstance(Q, InterfaceOperator) else Q[np.ix_(unknowns, unknowns)]
 
 
@@ -204,12 +241,20 @@ def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
     return np.sqrt(square / np.mean(square))
 
 
-def estimate_diagonal(product: Product, weights: np.ndarray, moves: np.ndarray) -> np.ndarray:
-    """diag(Q) (k dim,) from one product: its trace (Hutchinson 1989), shared out by nodal_weights (k,).
+def estimate_diagonal(product: Product, weights: Sequence[np.ndarray], moves: np.ndarray) -> np.ndarray:
+    """diag(Q) (k dim,) from one product: its trace (Hutchinson 1989) on each pair of surfaces, shared out by weights.
 
-    moves  (k dim,) mask of the components that can move; the diagonal is 0 elsewhere
+    weights  (k_i,) nodal_weights of each pair, one pair after the other
+    moves    (k dim,) mask of the components that can move; the diagonal is 0 elsewhere
     """
     signs = np.where(np.random.default_rng(0).random(len(moves)) < 0.5, -1.0, 1.0) * moves
-    trace = float(signs @ product(signs[:, None], 1e-2)[:, 0])
-    shares = np.repeat(weights**-2, len(moves) // len(weights)) * moves
-    return shares * (trace / shares.sum()) if shares.any() else shares
+    moved = product(signs[:, None], 1e-2)[:, 0]
+    dim = len(moves) // max(sum(len(own) for own in weights), 1)
+    diagonal, first = np.zeros(len(moves)), 0
+    for own in weights:
+        rows = slice(first, first + dim * len(own))
+        shares = np.repeat(own**-2, dim) * moves[rows]
+        if shares.any():
+            diagonal[rows] = shares * (float(signs[rows] @ moved[rows]) / shares.sum())
+        first = rows.stop
+    return diagonal

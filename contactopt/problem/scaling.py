@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.problem.interface_problem import InterfaceProblem
-from contactopt.problem.operators import NOISE, Interface, InterfaceOperator, diagonal
+from contactopt.problem.operators import NOISE, Interface, InterfaceOperator, diagonal, row_sizes
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ class Scales:
 def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     """The same problem with mean diagonal of Q one, forces of order one and unit columns of V.
 
-    The force scale is the mean force that the balance asks of a node or, without a balance, the force that closes
-    the root-mean-square of q at one node. Every change of units of the input gives the same numbers here.
+    The force scale is the mean force that the balance asks of a node or, without a balance, the force that removes the
+    root-mean-square overlap at one node; gaps, however wide, do not count. Every change of units of the input gives the same numbers here.
     A component that cannot move (on a symmetry plane, say) carries no force that matters: a unit compliance there
     makes that force zero instead of undetermined.
     """
@@ -38,16 +39,17 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     columns = np.linalg.norm(problem.V, axis=0)
     total = np.abs(problem.V).sum(axis=0)
     resultant = np.divide(np.abs(problem.s), total, out=np.zeros(len(problem.s)), where=total > 0)
-    force = float(resultant.max(initial=0.0)) or float(np.sqrt(np.mean(problem.q**2))) / compliance or 1.0
+    force = float(resultant.max(initial=0.0)) or _closing(problem) / compliance or 1.0
     length = force * compliance
     columns = np.where(columns > 0, columns, 1.0)
-    implicit = isinstance(problem.Q, InterfaceOperator)
-    sizes = d if implicit else np.abs(problem.Q).max(axis=1)
+    sizes = d if isinstance(problem.Q, InterfaceOperator) else row_sizes(problem.Q)
     moves = [sizes, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
     rigid = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
     Q: Interface
     if isinstance(problem.Q, InterfaceOperator):
         Q = problem.Q.scaled(1 / compliance, rigid.astype(float))
+    elif sp.issparse(problem.Q):
+        Q = sp.csr_array(problem.Q / compliance + sp.diags_array(rigid.astype(float)))
     else:
         entries = np.array(problem.Q / compliance)
         entries[rigid, rigid] = 1.0
@@ -61,3 +63,14 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
         law=problem.law.scaled(force),
     )
     return scaled, Scales(force, length, length / columns)
+
+
+def _closing(problem: InterfaceProblem) -> float:
+    """Root mean square of the overlaps of the contacts that overlap at r = 0; without any, of the least |q_i| > 0."""
+    normal = problem.q[:, 0]
+    overlap = np.where(problem.law.lowest < 0, np.abs(normal), -normal)
+    overlap = overlap[overlap > 0]
+    if len(overlap):
+        return float(np.sqrt(np.mean(overlap**2)))
+    sizes = np.linalg.norm(problem.q, axis=1)
+    return float(sizes[sizes > 0].min(initial=np.inf)) if np.any(sizes > 0) else 0.0

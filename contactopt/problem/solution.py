@@ -7,6 +7,8 @@ from enum import Enum
 
 import numpy as np
 
+from contactopt.problem.feasibility import Infeasible
+
 
 class Status(Enum):
     """How a solve ended: a word for tables and a sentence for people."""
@@ -18,6 +20,7 @@ class Status(Enum):
     CYCLING = "cycling", "the iteration came back to an earlier state, so it cannot converge; try relaxation"
     STALLED = "stalled", "the iterate no longer changes, but the certificate is above the tolerance"
     DIVERGED = "diverged", "the iterates grew without bound; the last finite one is kept"
+    INFEASIBLE = "infeasible", "the problem has no solution, and a ray proves it"
     BACKEND_FAILED = "backend_failed", "a QP or conic backend gave no usable answer"
 
     def __init__(self, label: str, sentence: str):
@@ -40,6 +43,7 @@ class Solution:
     seconds      phase -> seconds of wall time. "solve": of the method; "certificate": of judging its iterates. Who adds a
                  phase of their own names it: recovery, the coarse meshes before this one, the phases of a reduction
     notes        sentences about what the solve did otherwise than expected: a fallback, a stage that failed
+    proof        status `infeasible`: the ray that proves that there is no solution
     """
 
     reactions: np.ndarray
@@ -52,6 +56,7 @@ class Solution:
     seconds: dict[str, float] = field(default_factory=dict)
     message: str = ""
     notes: tuple[str, ...] = ()
+    proof: Infeasible | None = None
 
     @property
     def products(self) -> int:

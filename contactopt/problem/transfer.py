@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.problem.interface_problem import InterfaceProblem
+from contactopt.problem.pairs import part_of
 from contactopt.problem.solution import Solution
 
 THIN = 1e-6  # a surface narrower than this fraction of its length is a line
@@ -22,6 +23,16 @@ def transfer(source: InterfaceProblem, solution: Solution, target: InterfaceProb
     origin: along the polygon of the source's contacts in 2D, in the plane in which they extend most in 3D. Outside of the
     source's contacts the nearest one counts. The multipliers are taken over.
 
+    Parameters
+    ----------
+    source : a problem that was solved
+    solution : its solution
+    target : the problem to start, usually the same bodies on another mesh
+
+    Returns
+    -------
+    Solution : reactions and multipliers for the argument `start` of solve(), not certified
+
     Raises
     ------
     InputError : if the problems differ in dimension, in the number of coordinates or in that of plates
@@ -29,6 +40,8 @@ def transfer(source: InterfaceProblem, solution: Solution, target: InterfaceProb
     same = (source.dim, len(source.s), len(source.coordinates))
     if same != (target.dim, len(target.s), len(target.coordinates)):
         raise InputError("a start can be transferred between problems of the same dimension and number of plates only.")
+    if len(source.pairs) > 1:
+        return _by_pair(source, solution, target)
     traction = solution.reactions / source.areas[:, None]
     old, new = source.coordinates, target.coordinates
     if source.dim == 3:
@@ -41,6 +54,18 @@ def transfer(source: InterfaceProblem, solution: Solution, target: InterfaceProb
         chart = Chart(old[:1], (False,)) if thin else source.chart
         values = _along_a_line(chart, old, new, traction)
     return replace(solution, reactions=values * target.areas[:, None])
+
+
+def _by_pair(source: InterfaceProblem, solution: Solution, target: InterfaceProblem) -> Solution:
+    """Pairs of surfaces of the same name start from each other."""
+    names = [[pair.name for pair in problem.pairs] for problem in (source, target)]
+    if names[0] != names[1]:
+        raise InputError("a start can be transferred between problems with the same pairs of surfaces only.")
+    reactions = []
+    for old, new in zip(source.pairs, target.pairs):
+        own = replace(solution, reactions=solution.reactions[old.contacts])
+        reactions.append(transfer(part_of(source, old), own, part_of(target, new)).reactions)
+    return replace(solution, reactions=np.concatenate(reactions))
 
 
 def _plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

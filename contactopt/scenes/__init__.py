@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from contactopt.errors import InputError
+from contactopt.scenes.assemblies import arch, pin_in_bush, press_fit, stack
 from contactopt.scenes.common import with_elements
 from contactopt.scenes.flat import flat_punch, rigid_punch
 from contactopt.scenes.round import cylinder, growing_indentation, indentation, sphere
@@ -18,6 +19,7 @@ from contactopt.scenes.sliding import cattaneo, shear_cycle
 __all__ = [
     "PATHS",
     "SCENES",
+    "arch",
     "cattaneo",
     "cylinder",
     "flat_punch",
@@ -25,9 +27,12 @@ __all__ = [
     "indentation",
     "make_path",
     "make_scene",
+    "pin_in_bush",
+    "press_fit",
     "rigid_punch",
     "shear_cycle",
     "sphere",
+    "stack",
 ]
 
 # name -> (function making the scene from keyword arguments, what it is)
@@ -36,6 +41,10 @@ SCENES: dict[str, tuple[Callable[..., Scene], str]] = {
     "punch-3d": (lambda **changes: flat_punch(3, **changes), "square flat punch on a foundation, quarter model"),
     "sphere": (sphere, "half sphere on a foundation, axisymmetric, contact-zone loop"),
     "cylinder-2d": (cylinder, "half cylinder on a foundation, plane strain, contact-zone loop"),
+    "pin-in-bush": (pin_in_bush, "pin in a bush with clearance, held by contact alone, plane strain, half model"),
+    "press-fit": (press_fit, "hollow shaft in a hub that is too narrow for it, plane strain, quarter model"),
+    "stack": (stack, "blocks that rest on each other, tilted, under their weight, plane strain"),
+    "arch": (arch, "half circle of stones that rest on each other, under its weight, plane strain"),
     "rigid-punch-2d": (lambda **changes: rigid_punch("plane-strain", **changes), "rigid flat punch on a half-plane"),
     "rigid-punch-axisymmetric": (
         lambda **changes: rigid_punch("axisymmetric", **changes),
@@ -54,9 +63,22 @@ PATHS: dict[str, Callable[..., tuple[Scene, ...]]] = {
 
 
 def make_scene(name: str, *, degree: int | None = None, simplices: bool = False, **changes: object) -> Scene:
-    """The named scene with some of its arguments changed; InputError for an unknown name or argument.
+    """Make a named scene.
 
-    degree     of the displacement, 1 or 2, None for the scene's own;  simplices  triangles or tetrahedra instead of quadrilaterals or hexahedra
+    Parameters
+    ----------
+    name : a key of SCENES
+    degree : of the displacement in every element, 1 or 2; None: the scene's own
+    simplices : whether the meshes have triangles or tetrahedra instead of quadrilaterals or hexahedra
+    changes : other values of the arguments of the function that makes the scene
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InputError : for an unknown name or argument, and for values that the scene refuses
     """
     if name not in SCENES:
         raise InputError(f"unknown scene {name!r}; choose from {', '.join(SCENES)}.")
@@ -64,9 +86,20 @@ def make_scene(name: str, *, degree: int | None = None, simplices: bool = False,
 
 
 def make_path(name: str, *, degree: int | None = None, simplices: bool = False, **changes: object) -> tuple[Scene, ...]:
-    """The load path of a named scene, its arguments and those of its states changed; InputError if it has none.
+    """Make the load path of a named scene.
 
-    degree, simplices  as in make_scene
+    Parameters
+    ----------
+    name : a key of PATHS
+    degree, simplices, changes : as in make_scene()
+
+    Returns
+    -------
+    The states of the scene, in their order.
+
+    Raises
+    ------
+    InputError : for a scene without a load path, and as make_scene()
     """
     if name not in PATHS:
         raise InputError(f"scene {name!r} has no load path; choose from {', '.join(PATHS)}.")

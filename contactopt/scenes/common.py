@@ -28,6 +28,4 @@ def with_elements(scene: Scene, degree: int | None = None, simplices: bool = Fal
 
         return replace(part, mesh=mesh)
 
-    return replace(
-        scene, degree=scene.degree if degree is None else degree, upper=cut(scene.upper), lower=cut(scene.lower)
-    )
+    return replace(scene.with_parts(cut), degree=scene.degree if degree is None else degree)

@@ -7,15 +7,15 @@ Everything here is frozen and checked when it is made. The unit system is the us
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from contactopt.checks import check_name, check_number, real_array
+from contactopt.checks import check_name, check_number
 from contactopt.errors import InputError
 from contactopt.material import Material
-from contactopt.problem.laws import find_law
+from contactopt.scenes.contact import Contact
 
 MOST_ELEMENTS = 100_000  # across the contact half-width
 LARGEST = 1e100  # of forces, stresses and lengths: the squares of larger ones are no numbers
@@ -71,9 +71,10 @@ class Part:
 
     mesh     a scikit-fem mesh with named boundaries, or a function (elements, zone) -> mesh, where `elements`
              counts elements across the contact half-width and `zone` is the half-width the mesh must resolve.
-    contact  the name of the candidate contact boundary.
+    contact  the name of the candidate contact boundary; a Contact of the scene can name others.
     curve    function (dim, k) -> (dim, k) that puts points of the contact boundary on the surface that the mesh stands
-             for: the gap of a curved body at nodes within its edges (degree 2). None: the edges are the surface.
+             for: the gap of a curved body at nodes within its edges (degree 2). None: the edges are the surface. For a
+             body with several contact boundaries, a mapping from the name of a boundary to its function.
     """
 
     name: str
@@ -82,12 +83,18 @@ class Part:
     supports: tuple[Support, ...] = ()
     loads: tuple[Traction | BodyForce | Plate, ...] = ()
     contact: str = "contact"
-    curve: Callable[[np.ndarray], np.ndarray] | None = None
+    curve: Callable[[np.ndarray], np.ndarray] | Mapping[str, Callable[[np.ndarray], np.ndarray]] | None = None
 
     def __post_init__(self) -> None:
         check_name("the body's name", self.name)  # of its VTU file
         if not isinstance(self.material, Material):
             raise InputError(f"body '{self.name}': its material must be a Material(E, nu); got {self.material!r}.")
+
+    def curve_of(self, boundary: str) -> Callable[[np.ndarray], np.ndarray] | None:
+        """The function that puts points of that contact boundary on its surface, if there is one."""
+        if callable(self.curve):
+            return self.curve if boundary == self.contact else None
+        return (self.curve or {}).get(boundary)
 
     def build_mesh(self, elements: int, zone: float | None) -> Any:
         return self.mesh(elements, zone) if callable(self.mesh) else self.mesh
@@ -114,20 +121,21 @@ class Rigid:
 
 @dataclass(frozen=True)
 class Scene:
-    """Two bodies that may touch: `upper` is pressed on `lower`.
+    """Bodies that may touch each other.
 
-    The contact normal is the outward normal of `lower`; a positive normal reaction pushes `upper` away from it.
+    The short form Scene(name, upper, lower, mu) is a scene of two bodies: `upper` is pressed on `lower`. The long form
+    Scene(name, bodies=(...), contacts=(Contact(...), ...)) holds any number of bodies and pairs of surfaces, each pair with
+    its own law. Readers use `parts` and `pairs`, which both forms have.
 
-    mu         what the law reads: the friction coefficient, for 'tresca' a bound of the tangential traction [stress]; a
-               number >= 0, one per contact node (k,), or a function of the nodes' positions (dim, k) that gives either.
+    mu, law    of the short form, as in Contact
+    bodies     of the long form
+    contacts   of the long form; every body belongs to at least one of them
     kind       'plane-strain', 'axisymmetric' (coordinates r, z) or 'solid'.
     thickness  depth of a plane-strain body [length].
     copies     how many mirror images make the whole body: 2 for a half model, 4 for a quarter. Forces, nodal
                forces and nodal areas are those of all the images together, as on the ring of an axisymmetric body.
     degree     of the displacement in every element: 1, linear, or 2, quadratic; 2 for nearly incompressible bodies,
                where linear elements lock.
-    law        a name in contactopt.problem.laws.LAWS: 'coulomb'; 'bilateral', contact that cannot open; 'tresca', 'associated' or
-               'frictionless'.
     elements   default number of elements across the contact half-width, for parts whose mesh is a function.
     zone       first guess of the contact half-width [length]; None when the geometry fixes the contact zone.
     units      names of the units of length and stress, for the axes of figures
@@ -135,9 +143,9 @@ class Scene:
     """
 
     name: str
-    upper: Part | Rigid
-    lower: Part | Rigid
-    mu: float | np.ndarray | Callable[[np.ndarray], Any]
+    upper: Part | Rigid | None = None
+    lower: Part | Rigid | None = None
+    mu: float | np.ndarray | Callable[[np.ndarray], Any] | None = None
     kind: str = "plane-strain"
     thickness: float = 1.0
     copies: int = 1
@@ -147,13 +155,13 @@ class Scene:
     zone: float | None = None
     units: tuple[str, str] = ("length", "stress")
     reference: Any = field(default=None, compare=False)
+    bodies: tuple[Part | Rigid, ...] = ()
+    contacts: tuple[Contact, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kind not in COMPONENTS:
             raise InputError(f"scene '{self.name}': unknown kind {self.kind!r}; choose from {', '.join(COMPONENTS)}.")
-        find_law(self.law)
-        if not callable(self.mu):
-            _check_friction(self.mu)
+        self._check_form()
         check_number("the thickness", self.thickness, low=0.0)
         if self.zone is not None:
             check_number("the contact zone's half-width", self.zone, low=0.0)
@@ -166,23 +174,44 @@ class Scene:
             raise InputError(
                 f"scene '{self.name}': the degree of the displacement must be 1 or 2; got {self.degree!r}."
             )
-        if isinstance(self.upper, Rigid) and isinstance(self.lower, Rigid):
-            raise InputError(f"scene '{self.name}': both bodies are rigid; at least one must be elastic.")
-        if self.upper.name == self.lower.name:
-            raise InputError(f"scene '{self.name}': both bodies are called '{self.upper.name}'; rename one.")
-        for part in (self.upper, self.lower):
+        self._check_pairs()
+        for part in self.parts:
             self._check_part(part)
 
     @property
     def friction(self) -> str:
-        """The law and its number, for titles: 'mu = 0.3'."""
-        name = "mu" if self.law in ("coulomb", "bilateral") else f"{self.law}, mu"
-        return f"{name} = {self.mu:g}" if isinstance(self.mu, (int, float)) else f"{name} varies"
+        """The laws and their numbers, for titles: 'mu = 0.3'."""
+        return "; ".join(dict.fromkeys(pair.friction for pair in self.pairs))
 
     @property
     def parts(self) -> tuple[Part | Rigid, ...]:
-        """The bodies, upper first."""
+        """The bodies; in the short form the upper one first."""
+        if self.upper is None or self.lower is None:
+            return self.bodies
         return self.upper, self.lower
+
+    @property
+    def pairs(self) -> tuple[Contact, ...]:
+        """The pairs of surfaces that may touch."""
+        if self.upper is None or self.lower is None or self.mu is None:
+            return self.contacts
+        return (Contact(self.upper.name, self.lower.name, self.mu, self.law),)
+
+    def with_parts(self, change: Callable[[Any], Any]) -> Scene:
+        """The scene with `change` applied to each of its bodies."""
+        if self.upper is None or self.lower is None:
+            return replace(self, bodies=tuple(change(part) for part in self.bodies))
+        return replace(self, upper=change(self.upper), lower=change(self.lower))
+
+    def surfaces_of(self, part: Any) -> tuple[str, ...]:
+        """Names of the boundaries of a part that contacts use, each once, in the order of the pairs."""
+        found = [
+            surface or part.contact
+            for pair in self.pairs
+            for body, surface in zip(pair.bodies, pair.surfaces)
+            if body == part.name
+        ]
+        return tuple(dict.fromkeys(found)) or (part.contact,)
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -195,7 +224,52 @@ class Scene:
     @property
     def given(self) -> bool:
         """Whether the mesh of a body is given, not made for a number of elements."""
-        return any(isinstance(part, Part) and not callable(part.mesh) for part in (self.upper, self.lower))
+        return any(isinstance(part, Part) and not callable(part.mesh) for part in self.parts)
+
+    def _check_form(self) -> None:
+        """Either the short form is given in full or the long one."""
+        short = (self.upper is not None, self.lower is not None, self.mu is not None)
+        if self.bodies or self.contacts:
+            if any(short) or self.law != "coulomb":
+                raise InputError(
+                    f"scene '{self.name}': give either upper, lower, mu and law, or bodies and contacts, not both."
+                )
+            if not self.bodies or not self.contacts:
+                raise InputError(f"scene '{self.name}': bodies and contacts belong together; one of them is empty.")
+        elif not all(short):
+            raise InputError(f"scene '{self.name}': give upper, lower and mu, or bodies and contacts.")
+
+    def _check_pairs(self) -> None:
+        """Names of bodies are known and not given twice; no pair twice; no body without a pair; no two rigid bodies."""
+        names = [part.name for part in self.parts]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"scene '{self.name}': two bodies are named '{name}'; give each its own name.")
+        pairs = self.pairs
+        for pair in pairs:
+            if not isinstance(pair, Contact):
+                raise InputError(f"scene '{self.name}': contacts must be Contact objects; got {pair!r}.")
+            for name in pair.bodies:
+                if name not in names:
+                    raise InputError(
+                        f"scene '{self.name}': contact '{pair.name}' names a body '{name}' that is not there; "
+                        f"the bodies are {', '.join(names)}."
+                    )
+            if [other.name for other in pairs].count(pair.name) > 1:
+                raise InputError(f"scene '{self.name}': contact '{pair.name}' is given twice.")
+            rigid = [isinstance(self.parts[names.index(name)], Rigid) for name in pair.bodies]
+            for name, surface, stiff in zip(pair.bodies, pair.surfaces, rigid):
+                if stiff and surface is not None:
+                    raise InputError(
+                        f"scene '{self.name}': rigid body '{name}' has no surface {surface!r}; name the body alone."
+                    )
+            if all(rigid):
+                raise InputError(
+                    f"scene '{self.name}': both bodies of contact '{pair.name}' are rigid; at least one must be elastic."
+                )
+        for name in names:
+            if not any(name in pair.bodies for pair in pairs):
+                raise InputError(f"scene '{self.name}': body '{name}' belongs to no contact; drop it or give it one.")
 
     def _check_part(self, part: Part | Rigid) -> None:
         if isinstance(part, Rigid):
@@ -227,12 +301,3 @@ class Scene:
                     f"body '{body}': there is no component {component!r}; use {', '.join(self.components)}."
                 )
             check_number(f"the {component} value of body '{body}'", value, -LARGEST, LARGEST)
-
-
-def _check_friction(mu: Any) -> None:
-    """Raise InputError unless mu is a number, or an array of numbers, that are not negative."""
-    name = "the friction coefficient mu"
-    if np.ndim(mu) == 0:
-        check_number(name, mu, low=0.0, closed=True)
-    elif np.any(real_array(name, mu) < 0):
-        raise InputError(f"{name} must not be negative; its least value is {np.min(mu):g}.")

@@ -8,10 +8,20 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.checks import check_number, real_array
 from contactopt.errors import BackendError, InputError
-from contactopt.problem import InterfaceProblem, Scales, Solution, Status, dimensionless, natural_map_residual
+from contactopt.problem import (
+    InterfaceProblem,
+    Scales,
+    Solution,
+    Status,
+    dimensionless,
+    infeasibility,
+    natural_map_residual,
+)
+from contactopt.problem.balance import escape, sentence
 from contactopt.problem.certificate import Moved
 from contactopt.problem.operators import InterfaceOperator, loosened
 from contactopt.solving.deadline import TimeUp, until
@@ -20,6 +30,8 @@ from contactopt.solving.notes import collected
 
 CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
+CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
+PROOF = 0.3, 5.0  # least and most seconds for the proof that a problem has no solution
 SAME = 1e-11  # relative distance at which two iterates are the same state
 CONFIRM = 8  # repeated states in a row after which a method is not going anywhere; some change course before that
 
@@ -38,16 +50,31 @@ def solve(
 ) -> Solution:
     """Solve an interface problem; the answer's status is `solved` only if its certificate is at most `tol`.
 
-    method          a name (see `contactopt list`) with its `settings`, or a method object; None: `auto`, or `alternating`
-                    if the settings name a backend
-    tol             bound on natural_map_residual(problem, reactions, multipliers)
-    max_iterations, time_limit [s]   of the method, residual evaluation not counted
-    change_tol      the paper's criterion |r_t - r_t previous| / |r_t| <= change_tol (1e-5 there), None: not used. If
-                    it is met first the iteration ends, with status `settled` unless the certificate agrees
-    start           a solution of a problem of the same size, to start from instead of cold
-    progress        called with (iteration, residual) after each outer iteration
-    Raises InputError on arguments that make no sense, an unknown or missing backend, a method that does not solve the
-    problem's law, or a load that pulls the bodies apart. A backend that fails while solving is a status, with the last iterate.
+    A problem that has no solution ends `infeasible`, with a proof, where one is found. A backend that fails while solving
+    gives a status, too, with the last iterate.
+
+    Parameters
+    ----------
+    problem : what to solve
+    method : a name (see `contactopt list`) with its `settings`, or a method object; None: `auto`, or `alternating` if the
+        settings name a backend
+    tol : bound on natural_map_residual(problem, reactions, multipliers) [-]
+    max_iterations : of the method
+    time_limit : of the method [s]; the time of the certificate is not counted
+    change_tol : bound of the paper's criterion |r_t - r_t previous| / |r_t| (1e-5 there); None: not used. If it is met
+        first, the iteration ends with status `settled` unless the certificate agrees
+    start : a solution of a problem of the same size, to start from instead of cold
+    progress : called with (iteration, residual) after each outer iteration
+    settings : of a method that is given by its name
+
+    Returns
+    -------
+    Solution : reactions (k, dim) [force], multipliers (p,) [length], status, certificate and history
+
+    Raises
+    ------
+    InputError : on arguments that make no sense, an unknown or missing backend, a method that does not solve the problem's
+        law, or a load that pulls the bodies apart
     """
     check_number("tol", tol, low=0.0)
     check_number("max_iterations", max_iterations, low=0.0)
@@ -92,7 +119,12 @@ def _run(
     if problem.contacts == 0:
         return _without_contacts(problem, method, tol)
     _check_equilibrium(problem)
-    if not getattr(method, "implicit", False):
+    if not problem.symmetric and not getattr(method, "unsymmetric", False):
+        name = type(method).__name__.lower()
+        raise InputError(
+            f"method '{name}' minimises an energy, which an unsymmetric Q does not have; use auto or proximal."
+        )
+    if not getattr(method, "sparse" if sp.issparse(problem.Q) else "implicit", False):
         problem = problem.explicit()
     scaled, scales = dimensionless(problem)
     recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)
@@ -107,6 +139,11 @@ def _run(
         if iterate is not None:
             ended = recorder.record(iterate, _counts(operator))
     status = Status.SOLVED if recorder.residual <= tol else ended
+    proof = None
+    if status is not Status.SOLVED and recorder.residual > CLOSE:
+        proof = infeasibility(problem, float(np.clip(time_limit - recorder.clock, *PROOF)))
+        if proof is not None:
+            message, status = proof.sentence, Status.INFEASIBLE
     return Solution(
         recorder.reactions,
         recorder.multipliers,
@@ -117,6 +154,7 @@ def _run(
         tuple(recorder.history),
         {"solve": recorder.clock, "certificate": recorder.certified},
         message or status.sentence,
+        proof=proof,
     )
 
 
@@ -180,7 +218,8 @@ class _Recorder:
         self.reactions, self.multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
         self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
         self.history: list[dict[str, float]] = []
-        self.recent: list[np.ndarray] = [self.reactions]
+        self.previous = self.reactions
+        self.recent: list[np.ndarray] = [np.zeros(problem.q.size + len(problem.s))]
         self.clock, self.certified = 0.0, 0.0
         self.repeated = 0
 
@@ -206,9 +245,11 @@ class _Recorder:
         begin = time.perf_counter()
         self.residual = self._certificate(known)
         self.certified += time.perf_counter() - begin
-        change = _relative(self.reactions[:, 1:], self.recent[-1][:, 1:])
-        repeats = [m for m, old in enumerate(reversed(self.recent), 1) if _relative(self.reactions, old) < SAME]
-        self.recent = [*self.recent[1 - CYCLE :], self.reactions]
+        change = _relative(self.reactions[:, 1:], self.previous[:, 1:])
+        self.previous = self.reactions
+        state = np.concatenate([r.ravel(), lam])
+        repeats = [m for m, old in enumerate(reversed(self.recent), 1) if _relative(state, old) < SAME]
+        self.recent = [*self.recent[1 - CYCLE :], state]
         self.history.append({"residual": self.residual, "change": change, "seconds": self.clock} | counts)
         if self.progress is not None:
             self.progress(len(self.history), self.residual)
@@ -230,7 +271,16 @@ def _relative(new: np.ndarray, old: np.ndarray) -> float:
 
 
 def _check_equilibrium(problem: InterfaceProblem) -> None:
-    """Contact only pushes: a plate that moves along the normals must be pressed on, not pulled off."""
+    """Contact only pushes: InputError for a load that it cannot balance.
+
+    Where the multipliers are known by name, the motion along which the bodies escape is looked for. Otherwise only a plate
+    that moves along the normals and is pulled off is refused.
+    """
+    if problem.motions:
+        found = escape(problem)
+        if found is not None:
+            raise InputError(sentence(problem, found))
+        return
     if not problem.law.unilateral:
         return
     V = problem.V.reshape(problem.contacts, problem.dim, -1)

@@ -8,11 +8,23 @@ import re
 def as_rst(lines: list[str]) -> list[str]:
     """Docstrings are plain text: aligned and indented lines become literal, the rest is kept from meaning anything.
 
+    NumPy's sections, whose titles are underlined with dashes, become rubrics over lists of definitions.
+
     Changes `lines` in place, as autodoc wants it, and returns it.
     """
     out: list[str] = []
-    kind = "prose"  # of the line before: prose, item (of a numbered list) or literal
-    for line in lines:
+    kind = "prose"  # of the line before: prose, item (of a numbered list), literal or section (of a NumPy docstring)
+    for line, following in zip(lines, [*lines[1:], ""]):
+        if re.fullmatch(r"-{3,}", following) and line.strip():
+            out += ["", f".. rubric:: {line.strip()}", ""]
+            kind = "section"
+            continue
+        if kind == "section":
+            if not re.fullmatch(r"-{3,}", line):
+                term = line[:1] != " " and (following[:1] == " " or re.match(r"[\w, ]+ : ", line) is not None)
+                out += [""] if term else []
+                out.append(f"    {_plain(line.strip())}" if line[:1] == " " else _plain(line))
+            continue
         aligned = bool(line) and (line[0] == " " or re.search(r"\S {2,}\S", line) is not None)
         if line.strip() and kind == "item" and line[0] == " ":
             out[-1] += " " + _plain(line.strip())

@@ -109,7 +109,7 @@ ax.legend(frameon=False)
 #
 # The *convex relaxation* minimises the energy over all cones at once, $\min \tfrac12 r'Qr + q'r$ with
 # $|r_t| \le \mu r_n$. It is one convex program without any iteration around it. Its certificate, printed above, is about
-# $6 \cdot 10^{-3}$, while those of the other methods are below $10^{-10}$. This is not a rounding error. The relaxation has
+# $2 \cdot 10^{-2}$, while those of the other methods are below $10^{-10}$. This is not a rounding error. The relaxation has
 # solved its own problem exactly, but that problem is another one: *associated friction*. In this law a contact that slips
 # also opens, by $u_n = \mu |u_t|$.
 
@@ -130,7 +130,7 @@ right.plot(x, 0.2 * np.abs(u_relaxed[:, 1]), "k:", label=r"associated: $\mu\, |u
 right.set(xlabel="x [mm]", ylabel="displacement [mm]")
 right.legend(frameon=False)
 
-assert 5.5e-3 < relaxed.residual < 6.5e-3  # not Coulomb's problem
+assert 1.5e-2 < relaxed.residual < 2.5e-2  # not Coulomb's problem
 assert np.allclose(u[:, 0], 0.0, atol=1e-9)  # everything touches
 assert np.allclose(u_relaxed[:, 0], 0.2 * np.abs(u_relaxed[:, 1]), atol=1e-6)  # slips, so it floats
 assert np.isclose(relaxed.reactions[:, 0].sum(), 100.0)

@@ -5,7 +5,7 @@ None of them changes what a solver converges to. They change only how long it ta
 
 from __future__ import annotations
 
-# `python -m experiments.body_solvers` measures time and memory of every solver over the number of unknowns.
+# `python -m experiments.questions.body_solvers` measures time and memory of every solver over the number of unknowns.
 PARDISO_FROM = 5_000  # unknowns of a 3D body from which PARDISO is faster than SuperLU
 FACTORS_UP_TO = {"superlu": 100_000, "pardiso": 200_000}  # unknowns of a 3D body that is factorised
 

@@ -10,10 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
-from contactopt.solving.kernels.bonded import Bonded
+from contactopt.solving.kernels.bonded import SOFTEST, Bonded
 from contactopt.solving.kernels.krylov import krylov_step, model_of
 from contactopt.solving.kernels.semismooth import RIDGE, Equations
 
@@ -48,6 +50,15 @@ def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = Non
     )
 
 
+def definite(Q: sp.csr_array) -> bool:
+    """Whether a sparse symmetric Q is safely positive definite, as that of elastic bodies without redundant contacts."""
+    try:
+        pivots = splu(sp.csc_array(Q), diag_pivot_thresh=0.0, options={"SymmetricMode": True}).U.diagonal()
+    except RuntimeError:
+        return False
+    return bool(pivots.min() > SOFTEST**2 * pivots.max())
+
+
 def bonded_factor(problem: InterfaceProblem) -> Bonded | None:
     """The factorised bonded system where it pays: elastic bodies pressed together by a plate, Q of full rank."""
     try:
@@ -74,6 +85,34 @@ def dense(problem: InterfaceProblem) -> tuple[Step, Step]:
         return lambda equations, error, balance, D, rtol: newton_step(equations, factor, error, balance, D, ridge)
 
     return steps(RIDGE), steps(GLUE)
+
+
+def sparse(problem: InterfaceProblem) -> tuple[Step, Step]:
+    """Newton's steps by sparse factors, for many bodies of which each touches few others, and those of the bonded solution."""
+    V = sp.csr_array(problem.V)
+
+    def steps(ridge: float) -> Step:
+        return lambda equations, error, balance, D, rtol: sparse_step(equations, V, error, balance, D, ridge)
+
+    return steps(RIDGE), steps(GLUE)
+
+
+def sparse_step(
+    equations: Equations, V: sp.csr_array, error: np.ndarray, balance: np.ndarray, D: np.ndarray, ridge: float
+) -> Iterate | None:
+    """One step by the factors of [[I - D + D rho (Q + ridge I), D rho V], [V', 0]]; None if it is singular."""
+    k, d = error.shape
+    n, p = error.size, len(balance)
+    places = np.arange(k * d).reshape(k, d)
+    where = np.repeat(places, d, axis=1).ravel(), np.tile(places, (1, d)).ravel()
+    scaled = sp.csr_array(((equations.rho[:, None, None] * D).ravel(), where), (n, n))
+    rest = sp.csr_array(((np.eye(d) - D + ridge * equations.rho[:, None, None] * D).ravel(), where), (n, n))
+    matrix = sp.block_array([[scaled @ equations.Q + rest, scaled @ V], [V.T, sp.csr_array((p, p))]], format="csc")
+    try:
+        x = splu(matrix).solve(np.concatenate([error.ravel(), -balance]))
+    except RuntimeError:  # exactly singular
+        return None
+    return (x[:n].reshape(k, d), x[n:]) if np.all(np.isfinite(x)) else None
 
 
 def newton_step(
@@ -106,7 +145,8 @@ def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
         return zero
     glue = replace(glued_projection(coulomb_equations(problem), glued), rho=np.ones(problem.contacts))
     _, error, balance, D = glue.evaluate(*zero)
-    bonded = (step or dense(problem)[1])(glue, error, balance, D, FIRST)
+    make = sparse if sp.issparse(problem.Q) else dense
+    bonded = (step or make(problem)[1])(glue, error, balance, D, FIRST)
     if bonded is None or len(problem.s):
         return bonded or zero
     equations = coulomb_equations(problem)

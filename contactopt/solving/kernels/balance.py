@@ -11,7 +11,7 @@ import numpy as np
 
 from contactopt.solving.kernels.semismooth import Projection
 
-STEPS = 50
+STEPS = 50  # of Newton's method
 EXACT = 1e-13  # relative error of the balance at which the search ends
 CURVATURE = 1e-10  # relative to V'V, added to the Newton matrix: nothing need be in contact at the start
 
@@ -19,11 +19,21 @@ CURVATURE = 1e-10  # relative to V'V, added to the Newton matrix: nothing need b
 def project_balanced(
     project: Projection, y: np.ndarray, V: np.ndarray, s: np.ndarray, step: float, multipliers: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """r (k, d) and lambda (p,) with r = P(y - step V lambda), V' r + s = 0; `multipliers` is where lambda starts.
+    """Solve r = P(y - step V lambda), V' r + s = 0 for r and lambda.
 
-    project  P and its derivative, P a projection on a closed convex set of (k, d) that holds zero
-    y        (k, d);   V (k d, p), s (p,);   step > 0
-    If the set holds no balanced r, what comes back is the r that its last lambda gives.
+    If no r in the set keeps the balance, the r of the last lambda comes back.
+
+    Parameters
+    ----------
+    project : P and its derivative; P is a projection on a closed convex set that holds zero
+    y : (k, d) the point that is projected
+    V, s : (k d, p) rigid motions and (p,) resultants
+    step : greater than 0
+    multipliers : (p,) where lambda starts
+
+    Returns
+    -------
+    r (k, d) and lambda (p,)
     """
     lam = multipliers
     if len(s) == 0:

@@ -36,7 +36,7 @@ class Bonded:
         self.place = np.full(n, -1)  # unknown -> its column of G, -1 if not there yet
 
     def solve(self, z: np.ndarray, balance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """dr, dlambda with Q dr + V dlambda = z (n,) or (n, j) and V' dr = -balance (p,) or (p, j)."""
+        """The solution dr, dlambda of Q dr + V dlambda = z (n,) or (n, j), V' dr = -balance (p,) or (p, j)."""
         dr = la.cho_solve(self.factor, z, check_finite=False)
         if self.V.shape[1] == 0:
             return dr, np.zeros_like(balance)
@@ -44,7 +44,7 @@ class Bonded:
         return dr - self.X @ multipliers, multipliers
 
     def inverse(self, unknowns: np.ndarray) -> np.ndarray:
-        """Columns of G for these unknowns, each computed once."""
+        """The columns of G (n, m) for these unknowns (m,). Each is computed once and kept."""
         new = unknowns[self.place[unknowns] < 0]
         if len(new):
             unit = np.zeros((len(self.V), len(new)))
@@ -57,13 +57,14 @@ class Bonded:
     def step(
         self, rho: np.ndarray, error: np.ndarray, balance: np.ndarray, D: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """One Newton step, as Equations.step: dr (k, d), dlambda (p,). Raises LinAlgError if it is singular."""
+        """dr (k, d), dlambda (p,) of the Newton step that Equations.step takes; LinAlgError if its system is singular."""
         k, d = error.shape
         loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))
         N = (loose[:, None] * d + np.arange(d)).ravel()
         z = (error / rho[:, None]).ravel()
         z[N] = 0.0
         dr, multipliers = self.solve(z, balance)
+        # So far every contact sticks. The others correct that by their displacements z_N.
         if len(N):
             G = self.inverse(N)
             keep = np.eye(d) - D[loose]

@@ -73,36 +73,44 @@ def _symmetric_step(
     equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
 ) -> Step:
     Q, V = loosened(equations.Q, PRODUCTS * rtol), equations.V
+    # The unknowns alpha are the amounts of the directions U in which a contact may still change its force.
     U, delta, rho = _directions(D, equations.rho)
+    # B of the module's head; a proximal subproblem adds its weight to Q.
     added = (1 - delta) / (delta * rho) + equations.weight
+    # dr0, the part of the step outside these directions, is known at once.
     known = error.ravel() - U @ (U.T @ error.ravel())
     right = (U.T @ error.ravel()) / (delta * rho)
     if np.any(known):
         right -= U.T @ (Q @ known)
+    # In these directions the balance reads W' alpha = b.
     W, b = U.T @ V, -balance - V.T @ known
     m = len(delta)
     if m == 0:
         return known.reshape(error.shape), np.zeros(len(balance))
+    # N, an approximate inverse of the system U'QU + B, and Y = N W, K = (W'N W)^-1. They make two projections:
     near = restricted(P, U, added)
     Y = np.stack([near @ w for w in W.T], axis=1) if W.shape[1] else W
     K = np.linalg.pinv(W.T @ Y)
 
-    def off(x: np.ndarray) -> np.ndarray:  # projection onto the balanced alpha
+    def off(x: np.ndarray) -> np.ndarray:  # I - Y K W', onto the alpha that do not change the balance, W' alpha = 0
         return x - Y @ (K @ (W.T @ x))
 
-    def off_t(x: np.ndarray) -> np.ndarray:
+    def off_t(x: np.ndarray) -> np.ndarray:  # its transpose I - W K Y', which removes multipliers from a residual
         return x - W @ (K @ (Y.T @ x))
 
     def product(x: np.ndarray) -> np.ndarray:
         return U.T @ (Q @ (U @ x)) + added * x
 
+    # Start at an alpha that has the balance; all corrections then keep it.
     start = Y @ (K @ b)
     residual = right - product(start) if np.any(start) else right
     system = LinearOperator((m, m), matvec=lambda x: off_t(product(off(x.ravel()))), dtype=float)
     inverse = LinearOperator((m, m), matvec=lambda x: off(near @ off_t(x.ravel())), dtype=float)
     size = max(np.linalg.norm(off_t(right)), np.linalg.norm(off_t(residual)))
+    # The residual is compared with the right side without multipliers, or with the first residual if that is larger.
     beta, _ = cg(system, off_t(residual), rtol=0.0, atol=rtol * size, M=inverse, maxiter=RESTART * CYCLES)
     alpha = start + off(beta)
+    # The multipliers are what is left of the residual, which lies in the range of W.
     multipliers = K @ (Y.T @ (right - product(alpha))) if len(b) else b
     return (known + U @ alpha).reshape(error.shape), multipliers
 

@@ -68,9 +68,25 @@ def mprgp(
 ) -> BoxResult:
     """Solve min x'Px/2 + c'x, x >= low, until the norm of the projected gradient is at most tol |c|.
 
-    P (n, n) symmetric positive semidefinite, c (n,), low (n,) finite or -inf, start (n,) or None: zero. The arithmetic
-    is that of P's type. largest: an upper bound of P's largest eigenvalue, estimated if None. Raises InputError on
-    shapes that do not fit.
+    The arithmetic is that of P's type.
+
+    Parameters
+    ----------
+    P : (n, n) symmetric positive semidefinite
+    c : (n,)
+    low : (n,) bounds, finite or -inf
+    start : (n,); None: zero
+    tol : bound of the projected gradient over |c|
+    max_iterations : steps, each with one or two products with P
+    largest : an upper bound of P's largest eigenvalue; estimated if None
+
+    Returns
+    -------
+    BoxResult
+
+    Raises
+    ------
+    InputError : on shapes that do not fit
     """
     _check(P, c, low)
     target = tol * float(np.linalg.norm(c))
@@ -195,11 +211,25 @@ def smalbe(
 ) -> BoxResult:
     """min x'Px/2 + c'x, x >= low, A x = b: MPRGP inside the augmented Lagrangian method (SMALBE-M, Dostal).
 
-    A (p, n) of full rank, b (p,), multipliers (p,) a first guess of y in P x + c + A'y. The rows are made
-    orthonormal first; the penalty starts as P's largest eigenvalue and grows where the error of the rows falls too slowly;
-    each inner accuracy is proportional to that error.
-    Met: the projected gradient of the Lagrangian is at most tol |c + A'y| and the error of the orthonormal rows at
-    most tol times their right side.
+    The rows of A are made orthonormal first. The penalty starts as P's largest eigenvalue and grows where the error of the
+    rows falls too slowly. The accuracy of each inner solve is proportional to that error. The tolerance is met when the
+    projected gradient of the Lagrangian is at most tol |c + A'y| and the error of the orthonormal rows at most tol times
+    their right side.
+
+    Parameters
+    ----------
+    P, c, low, start, max_iterations : as for mprgp()
+    A, b : (p, n) of full rank and (p,), the equality rows
+    multipliers : (p,) first guess of y in the gradient P x + c + A'y; None: zero
+    tol : as above
+
+    Returns
+    -------
+    BoxResult
+
+    Raises
+    ------
+    InputError : on shapes that do not fit
     """
     _check(P, c, low)
     if A.shape != (len(b), len(c)):

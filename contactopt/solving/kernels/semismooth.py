@@ -33,9 +33,14 @@ EXACT, WRONG = 1e-9, 1e-5  # relative residuals up to which an answer needs no s
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """The equations of one dimensionless problem: Q (kd, kd), q (k, d), V (kd, p), s (p,), rho (k,) or a number.
+    """The equations r = P(r - rho u), V' r + s = 0 of one dimensionless problem.
 
-    center, weight: with weight > 0 those of the proximal subproblem, u = Q r + V lambda + q + weight (r - center).
+    Q        (k d, k d) compliance;   q  (k, d) displacements without forces
+    V, s     (k d, p) rigid motions and (p,) resultants
+    project  the map P with its generalised derivative
+    rho      (k,) or one number
+    center   (k, d), and weight: with weight > 0 the equations are those of the proximal subproblem, in which
+             u = Q r + V lambda + q + weight (r - center)
     """
 
     Q: Interface
@@ -64,11 +69,12 @@ class Equations:
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """dr (k, d), dlambda (p,) of one Newton step; None if the linear system is singular.
 
-        (I - D (I - rho Q)) dr + D rho V dlambda = error,  V' dr = -balance. Open contacts (D = 0) are known at once
-        and leave the system; where D = I (stick, contact without friction) its rows are those of rho Q.
+        It solves (I - D (I - rho Q)) dr + D rho V dlambda = error, V' dr = -balance. Open contacts, D = 0, are known at
+        once and leave the system. Where D = I, in stick or in contact without friction, its rows are those of rho Q.
         """
         k, d = error.shape
         p = self.V.shape[1]
+        # Open contacts: dr = error. The unknowns are the other dr and dlambda, in one square matrix.
         closed = np.any(D != 0, axis=(1, 2))
         mask = np.repeat(closed, d)
         rows, gone = np.flatnonzero(mask), np.flatnonzero(~mask)
@@ -81,9 +87,10 @@ class Equations:
         matrix[:n, :n] = self.Q if n == k * d else self.Q[np.ix_(rows, rows)]
         matrix[np.arange(n), np.arange(n)] += self.weight + ridge
         matrix[:n, n:] = self.V[rows]
-        matrix[:n] *= rho[:, None]
+        matrix[:n] *= rho[:, None]  # now rho (Q dr + V dlambda), the rows of a contact that sticks
         matrix[n:, :n] = self.V[rows].T
         coupling = rho * (self.Q[np.ix_(rows, gone)] @ dr[gone]) if np.any(dr[gone]) else np.zeros(n)
+        # Where D is not I the rows become D (rho (Q dr + V dlambda) - dr) + dr.
         D = D[closed]
         bent = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))  # contacts that slip
         index = (bent[:, None] * d + np.arange(d)).ravel()
@@ -117,9 +124,23 @@ def crossover(
     multipliers: np.ndarray,
     steps: int = STEPS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Improve (r (k, d), multipliers (p,)) of a subproblem; what comes back is never worse than what came in.
+    """Improve an approximate answer of a subproblem by Newton steps, and return the best point on the way.
 
-    Q (kd, kd), c (kd,), V (kd, p), s (p,); the problem is dimensionless, so that rho = 1 is right.
+    The problem is dimensionless, so that rho = 1 is right. The residual of what comes back is never larger than that of
+    the projection of what came in.
+
+    Parameters
+    ----------
+    Q : (k d, k d) compliance
+    c : (k d,) displacements without forces
+    V, s : (k d, p) rigid motions and (p,) resultants
+    project : the map P with its generalised derivative
+    r, multipliers : (k, d) and (p,), the approximate answer
+    steps : Newton steps at most
+
+    Returns
+    -------
+    r (k, d) and multipliers (p,)
     """
     residual, r, multipliers = _improve(Equations(Q, c.reshape(r.shape), V, s, project), r, multipliers, steps)
     if steps == STEPS and residual > EXACT * max(1.0, float(np.linalg.norm(r))):
@@ -131,11 +152,23 @@ def certified(
     solvers: Iterable[tuple[str, Callable[[], tuple[np.ndarray, np.ndarray]]]],
     equations: Equations,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The first answer that a crossover makes exact, or else the best, of (name, solver) pairs.
+    """Ask backends one after the other until Newton steps make an answer exact.
 
-    A backend may call anything optimal. Each solver gives (r, multipliers) of the subproblem `equations`; the next one
-    (the same at tighter settings) is asked only if an answer is not exact. Raises BackendError, naming the last
-    backend, if even the best answer misses the problem it was given by more than WRONG.
+    A backend may call anything optimal, so that every answer is checked by its residual. The next solver, usually the same
+    backend at tighter settings, is asked only if the answer is not exact.
+
+    Parameters
+    ----------
+    solvers : pairs of a backend's name and a function that gives (r, multipliers)
+    equations : of the subproblem
+
+    Returns
+    -------
+    r (k, d) and multipliers (p,) of the first exact answer, or else of the best one
+
+    Raises
+    ------
+    BackendError : if the relative residual of even the best answer is above WRONG; it names the last backend
     """
     best, asked = (np.inf, np.zeros(0), np.zeros(0)), ""
     for attempt, (asked, solver) in enumerate(solvers):

@@ -21,7 +21,12 @@ def _index(k: int, dim: int, normal: bool) -> np.ndarray:
 
 
 class NormalProblem:
-    """The normal QP of one problem: Q_nn is handed to the backend once."""
+    """The bound-constrained QP of the normal forces; its matrix Q_nn is handed to the backend once.
+
+    backend : name of the QP solver
+    problem : dimensionless
+    columns : (p,) mask of the multipliers that belong to the normal problem
+    """
 
     def __init__(self, backend: str, problem: InterfaceProblem, columns: np.ndarray):
         n, t = (_index(problem.contacts, problem.dim, normal) for normal in (True, False))
@@ -43,7 +48,10 @@ class NormalProblem:
 
 
 class TangentialProblem:
-    """The tangential QP (one direction) or SOCP (two) of one problem, built once."""
+    """The QP (one tangential direction) or SOCP (two) of the tangential forces, built once.
+
+    Arguments as for NormalProblem; `columns` are those of the tangential problem.
+    """
 
     def __init__(self, backend: str, problem: InterfaceProblem, columns: np.ndarray):
         n, t = (_index(problem.contacts, problem.dim, normal) for normal in (True, False))

@@ -17,6 +17,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import scipy.linalg as la
@@ -36,6 +37,7 @@ class ADMM:
     """rho: first weight of r = z, in units of the mean compliance; balanced later."""
 
     rho: float = 1.0
+    unsymmetric: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_number("the weight rho", self.rho, low=0.0)

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -29,8 +30,9 @@ from contactopt.problem.laws import Law
 from contactopt.solving.kernels.alart_curnier import cold_start
 from contactopt.solving.kernels.balance import project_balanced
 from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue
+from contactopt.solving.kernels.sparse_blocks import block_matrix
 from contactopt.solving.methods import NATIVE, Iterate
-from contactopt.solving.methods.proximal import proximal_step
+from contactopt.solving.methods.proximal import proximal_equations
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,7 @@ class AugmentedLagrangian:
 
     rho: float = 100.0
     explicit: bool = False
+    unsymmetric: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_number("the penalty rho", self.rho, low=0.0)
@@ -54,11 +57,13 @@ class AugmentedLagrangian:
         return self._uzawa(problem, start) if self.explicit else self._exact(problem, start)
 
     def _exact(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:
-        r, multipliers = start or cold_start(problem)
+        point = start or cold_start(problem)
+        equations = proximal_equations(problem, block_matrix(problem.Q, problem.dim))
         solved = True
         while solved:
-            (r, multipliers), solved = proximal_step(problem, r, multipliers, 1 / self.rho)
-            yield r, multipliers
+            equations.at(point[0], 1 / self.rho)
+            point, solved, _ = equations.solve(*point)
+            yield point
 
     def _uzawa(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:
         r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start

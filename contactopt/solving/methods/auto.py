@@ -1,10 +1,13 @@
 """The default, without a number to choose: Newton's method, and where it fails cones, then the proximal loop.
 
-1. Newton's method from the bonded solution (or no force at all) while its residual falls: elastic bodies end here
-   (reports/newton_steps), each step one dense linear system.
-2. CONES iterations of the Acary-Cadoux fixed point: convex programs, which no cycle and no rank deficiency of Q disturbs.
-3. The proximal loop from there, which needs no symmetric Q and no backend.
-4. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
+1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no force at all) while its residual
+   falls. Elastic bodies end here (reports/newton_steps), each step one dense linear system.
+2. The interior-point method (contactopt.solving.kernels.interior), which no cycle and no rank deficiency of Q disturbs,
+   and a few steps of the proximal loop for the last digits. They need no symmetric Q and no backend.
+3. Where these fail and Q is a symmetric array: CONES iterations of the Acary-Cadoux fixed point, convex programs.
+   Where that fails too, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
+4. The proximal loop from the best of these points.
+5. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
    contact forces drawn at random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
    friction may have solutions that repel the loop and others that attract it.
 It ends where the driver's certificate or limits say so. There is no proof that it finds a solution: Coulomb's problem
@@ -20,15 +23,18 @@ from itertools import count, islice
 from typing import ClassVar
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.errors import BackendError, InputError
-from contactopt.problem import InterfaceProblem
+from contactopt.problem import InterfaceProblem, infeasibility
 from contactopt.problem.operators import InterfaceOperator
-from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations
+from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations, definite
+from contactopt.solving.kernels.interior import interior_iterates
+from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.solving.methods import NATIVE, Iterate, Known
 from contactopt.solving.methods.cone import AcaryCadoux
 from contactopt.solving.methods.newton import Newton
-from contactopt.solving.methods.proximal import Proximal
+from contactopt.solving.methods.proximal import Proximal, proximal_equations, proximal_iterates
 from contactopt.solving.notes import note
 from contactopt.solving.preconditioners import find_preconditioner
 
@@ -38,6 +44,9 @@ LIMIT = 25  # Newton steps
 PATIENCE = 6  # of them without progress
 PROGRESS = 0.9  # a residual that falls by less is no progress
 CONES = 5  # cone programs
+CLOSE = 1e-3  # error of an interior point from which Newton's method finds the last digits
+LEAST = 1e-4  # weight of the first of them
+FEW = 10  # proximal steps for the last digits, each so many of which must halve the residual
 ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
 LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 
@@ -48,6 +57,8 @@ class Auto:
 
     preconditioner: str | None = None
     implicit: ClassVar[bool] = True
+    sparse: ClassVar[bool] = True
+    unsymmetric: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         find_preconditioner(self.preconditioner)
@@ -56,17 +67,30 @@ class Auto:
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]:
-        reached = yield from self._newton(problem, start, self.preconditioner)
-        note(logger, "Newton's method made no progress, so cone programs and the proximal loop take over")
-        try:
-            problem = problem.explicit()  # all that follows looks at the entries of Q
-        except InputError as error:
-            note(logger, f"the default method ends with Newton's steps: {error}")
+        if sp.issparse(problem.Q) and not (problem.symmetric and definite(problem.Q)):
+            reached = start or (np.zeros(problem.q.shape), np.zeros(len(problem.s)))
+        else:
+            reached = yield from self._newton(problem, start, self.preconditioner)
+            note(logger, "Newton's method made no progress, so interior points and the proximal loop take over")
+            try:
+                if not sp.issparse(problem.Q):
+                    problem = problem.explicit()  # all that follows looks at the entries of Q
+            except InputError as error:
+                note(logger, f"the default method ends with Newton's steps: {error}")
+                return
+        matrix = block_matrix(problem.Q, problem.dim)
+        if start is not None and sp.issparse(problem.Q):
+            reached = yield from self._proximal(problem, matrix, start, FEW, LEAST)
+        if AcaryCadoux().solves(problem.law) and not problem.law.dilatant:
+            for full in (True, False):
+                reached = yield from self._interior(problem, matrix, reached, full)
+            if problem.symmetric and not sp.issparse(problem.Q):
+                reached = yield from self._cones(problem, reached)
+        if infeasibility(problem) is not None:  # the driver says so
             return
-        reached = yield from self._cones(problem, reached)
         random = np.random.default_rng(0)
         for restarts in count():
-            last = yield from self._proximal(problem, reached, ROUND * 2**restarts)
+            last = yield from self._proximal(problem, matrix, reached, ROUND * 2**restarts, Proximal.alpha)
             r = random.normal(size=problem.q.shape)
             r[:, 0] = np.abs(r[:, 0])
             r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
@@ -107,13 +131,34 @@ class Auto:
         return reached
 
     @staticmethod
-    def _proximal(problem: InterfaceProblem, start: Iterate, patience: int) -> Generator[Iterate, None, Iterate]:
-        """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last."""
-        equations = coulomb_equations(problem)
-        best, target, point = np.inf, np.inf, start
-        for done, point in enumerate(Proximal().iterate(problem, start), start=1):
+    def _interior(
+        problem: InterfaceProblem, matrix: Blocks, start: Iterate, full: bool
+    ) -> Generator[Iterate, None, Iterate]:
+        """The interior-point method and, where it came near to a solution, a few proximal steps for the last digits.
+
+        Returns the last point or a better `start`.
+        """
+        best, reached = np.inf, start
+        for point, error in interior_iterates(problem, matrix, full):
             yield point
-            best = min(best, equations.evaluate(*point)[0])
+            if error < best:
+                best, reached = error, point
+        if best < CLOSE:
+            alpha = max(LEAST, 100 * best)
+            reached = yield from Auto._proximal(problem, matrix, reached, FEW, alpha)
+        evaluate = proximal_equations(problem, matrix).evaluate
+        return min(start, reached, key=lambda point: evaluate(*point)[0])
+
+    @staticmethod
+    def _proximal(
+        problem: InterfaceProblem, matrix: Blocks, start: Iterate, patience: int, alpha: float
+    ) -> Generator[Iterate, None, Iterate]:
+        """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last."""
+        equations, check = (proximal_equations(problem, matrix) for _ in range(2))
+        best, target, point = np.inf, np.inf, start
+        for done, point in enumerate(proximal_iterates(equations, start, alpha), start=1):
+            yield point
+            best = min(best, check.evaluate(*point)[0])
             if done % patience == 0:
                 if best > target:
                     break

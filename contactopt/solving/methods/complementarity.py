@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from contactopt.problem.laws import Law
 from contactopt.solving.deadline import check_time
 from contactopt.solving.methods import NATIVE, Iterate
 
-LARGEST = 300  # contacts: the tableau has 2 (4 x 300)^2 entries
+MOST_CONTACTS = 300  # contacts: the tableau has 2 (4 x 300)^2 entries
 PIVOT, TIE = 1e-10, 1e-12  # least pivot; relative distance of equal ratios
 
 
@@ -36,14 +37,16 @@ class Lemke:
     def solves(self, law: Law) -> bool:
         return law.unilateral and law.proportional and not law.dilatant
 
+    unsymmetric: ClassVar[bool] = True
+
     def backends(self, dim: int) -> tuple[str, str]:
         if dim != 2:
             raise InputError("the method 'lemke' needs a 2D problem: in 3D friction is no LCP; use 'auto'.")
         return NATIVE, NATIVE
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
-        if problem.dim != 2 or problem.contacts > LARGEST:
-            raise InputError(f"the method 'lemke' needs a 2D problem of at most {LARGEST} contacts; use 'auto'.")
+        if problem.dim != 2 or problem.contacts > MOST_CONTACTS:
+            raise InputError(f"the method 'lemke' needs a 2D problem of at most {MOST_CONTACTS} contacts; use 'auto'.")
         for copositive in (False, True):
             M, q, C = complementarity_problem(problem, copositive)
             z = lemke(M, q)

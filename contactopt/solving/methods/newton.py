@@ -2,9 +2,10 @@
 
 Solves r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 with P the map of the law (contactopt.problem.laws): each step
 sorts the contacts into open, sticking and slipping and solves one linear system of the closed ones: dense, n^3/3 to
-2 n^3/3 operations, or, where Q is an operator, by PCG and GMRES to the accuracy that the step is worth (Eisenstat, Walker
-1996), some ten products with Q each (contactopt.solving.kernels.krylov). Where the bodies themselves are solved by
-iteration, one iteration sees contacts and bodies at once (contactopt.solving.kernels.coupled). Full steps from the bonded solution; the number of steps hardly depends on the mesh
+2 n^3/3 operations, by sparse factors where Q is sparse, or, where Q is an operator, by PCG and GMRES to the accuracy that
+the step is worth (Eisenstat, Walker 1996), some ten products with Q each (contactopt.solving.kernels.krylov). Where the
+bodies themselves are solved by iteration, one iteration sees contacts and bodies at once
+(contactopt.solving.kernels.coupled). Full steps from the bonded solution; the number of steps hardly depends on the mesh
 (reports/newton_steps). Not globally convergent: rank-deficient Q (rigid bodies, redundant contacts) or strong
 friction may make it cycle, which is what `proximal` is for.
 Sources: Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm for
@@ -19,11 +20,20 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+import scipy.sparse as sp
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import InterfaceOperator, loosened
-from contactopt.solving.kernels.alart_curnier import FIRST, cold_start, coulomb_equations, dense, forcing, krylov
+from contactopt.solving.kernels.alart_curnier import (
+    FIRST,
+    cold_start,
+    coulomb_equations,
+    dense,
+    forcing,
+    krylov,
+    sparse,
+)
 from contactopt.solving.kernels.coupled import coupled_steps
 from contactopt.solving.methods import NATIVE, Iterate, Known
 from contactopt.solving.notes import note
@@ -46,6 +56,8 @@ class Newton:
     linear: str | None = None
     preconditioner: str | None = None
     implicit: ClassVar[bool] = True  # takes an operator for Q
+    sparse: ClassVar[bool] = True  # and a sparse Q
+    unsymmetric: ClassVar[bool] = True  # and one that is not symmetric
 
     def __post_init__(self) -> None:
         if self.linear not in (None, "dense", "krylov", "coupled"):
@@ -69,10 +81,13 @@ class Newton:
             note(logger, UNSOLVED)
             return
         implicit = self.linear == "krylov" or (self.linear is None and isinstance(problem.Q, InterfaceOperator))
-        if not implicit:
+        if self.linear == "dense" or (isinstance(problem.Q, InterfaceOperator) and not implicit):
             problem = problem.explicit()
         equations = coulomb_equations(problem)
-        step, first = krylov(problem, self.preconditioner) if implicit else dense(problem)
+        if implicit:
+            step, first = krylov(problem, self.preconditioner)
+        else:
+            step, first = sparse(problem) if sp.issparse(problem.Q) else dense(problem)
         r, multipliers = cold_start(problem, first) if start is None else start
         last, rtol = np.inf, FIRST
         while True:

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import hypot
+from typing import ClassVar
 
 import numpy as np
 
@@ -35,6 +36,7 @@ class NSGS:
     """relaxation in (0, 2): the fraction of each local change that is taken."""
 
     relaxation: float = 1.0
+    unsymmetric: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         check_number("the relaxation", self.relaxation, low=0.0, high=2.0)

@@ -4,10 +4,14 @@ Paper, section 5.2: the H^1/2 seminorm of a function on the contact line, extend
 nodes, is a circulant matrix Q_c (27), the H^1 norm another, L_c (28); with m the smallest power of two >= k,
     P21 = E' Q_c E   (25),      P22 = (E' L_c^-1 Q_c E)^-1   (26),
 up to a factor that no iteration sees. P21 resembles S1 + S2; the matrix that P22 inverts resembles Q itself. In 3D
-the sum of P21 along both directions of the contact surface is P31 (29). Extension by zero belongs to functions that
-vanish at the ends (H00^1/2), which a traction at a free edge does not:
-    `neumann`, the square root of the Laplacian of the contact line or surface by cosine transforms (contactopt.solving.preconditioners.neumann),
-needs no extension. A contact line that is closed by itself needs none for P21 and P22 either: the circulant matrices act
+the sum of P21 along both directions of the contact surface is P31 (29).
+
+P maps a relative displacement, the residual b - Q r of an iteration, to a force. P21 extends that displacement by zero,
+which is right only for displacements that vanish at the ends (H00^1/2). They do not vanish at a free edge. The matrix
+that P22 inverts, like Q, acts on forces. There are none outside the contact, so that extending them by zero is right. The
+third preconditioner,
+    `neumann`, the square root of the Laplacian of the contact line or surface (contactopt.solving.preconditioners.neumann),
+needs no extension, for its cosine transforms leave the ends free. A contact line that is closed by itself needs none for P21 and P22 either: the circulant matrices act
 on its own nodes. Contacts are found on their line or grid in the problem's chart, so that it does not matter how the
 bodies are turned. Each preconditioner acts on every component by itself. What is left are a few smooth motions of the two bodies against
 each other, first of all the sway of a slender body: `deflated` solves for them exactly (balancing, Mandel 1993).
@@ -22,13 +26,14 @@ from __future__ import annotations
 from importlib import import_module
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt.errors import InputError
-from contactopt.problem import InterfaceProblem
+from contactopt.problem import InterfaceProblem, part_of
 from contactopt.problem.operators import Interface, diagonal, held
-from contactopt.solving.preconditioners.grid import Product
+from contactopt.solving.preconditioners.grid import GridMap
 
 ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an active set
 
@@ -36,7 +41,7 @@ ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an
 class Preconditioner(LinearOperator):
     """P (n, n), an approximate inverse of Q; model: G = P^-1 by cheap products, None where there is no such thing."""
 
-    def __init__(self, n: int, product: Product, model: Product | None = None):
+    def __init__(self, n: int, product: GridMap, model: GridMap | None = None):
         super().__init__(np.dtype(float), (n, n))
         self.product = product
         self.model = None if model is None else LinearOperator((n, n), matvec=model, rmatvec=model, dtype=float)
@@ -81,19 +86,33 @@ def find_preconditioner(name: str | None) -> None:
 
 
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
-    """The named approximate inverse of problem.Q, (k dim, k dim).
+    """The named approximate inverse of problem.Q, (k dim, k dim). Each pair of surfaces has its own block of it.
 
-    Uses of Q only its mean diagonal and which components cannot move.
-    Raises InputError for an unknown name, fewer than 3 contacts a side, or contacts not on a line or rectangular grid: the
-    caller says what it does instead.
+    Of Q it uses the mean of the diagonal, and which components cannot move.
+
+    Parameters
+    ----------
+    problem : of k contacts on a line, a closed curve or a rectangular grid
+    name : a key of PRECONDITIONERS
+
+    Returns
+    -------
+    Preconditioner, whose `model` is None where its inverse is not cheap.
+
+    Raises
+    ------
+    InputError : for an unknown name, for fewer than 3 contacts a side, and for contacts on no line and no rectangular grid.
+        The caller says what it does instead.
     """
     find_preconditioner(name)
+    if len(problem.pairs) > 1:
+        return _blocks(problem, [preconditioner(part_of(problem, pair), name) for pair in problem.pairs])
     still = held(problem.Q)
     mean = float(np.mean(diagonal(problem.Q)[~still])) if not still.all() else 1.0
     module, function, _ = PRECONDITIONERS[name]
     product, inverse = getattr(import_module(module), function)(problem, still.reshape(problem.q.shape))
 
-    def beside(act: Product, factor: float) -> Product:
+    def beside(act: GridMap, factor: float) -> GridMap:
         def apply(x: np.ndarray) -> np.ndarray:
             made = act(np.where(still, 0.0, x).reshape(problem.q.shape))
             return np.where(still, x, factor * made.ravel())  # what cannot move is on its own
@@ -104,7 +123,28 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
     return Preconditioner(problem.q.size, beside(product, 1 / mean), model)
 
 
+def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Preconditioner:
+    """One preconditioner from those of the pairs of surfaces."""
+    rows = [slice(pair.first * problem.dim, pair.last * problem.dim) for pair in problem.pairs]
+
+    def product(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([part @ x[own] for part, own in zip(parts, rows)])
+
+    models = [part.model for part in parts if part.model is not None]
+
+    def model(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([part @ x[own] for part, own in zip(models, rows)])
+
+    return Preconditioner(problem.q.size, product, model if len(models) == len(parts) else None)
+
+
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
+    """Constant and linear motions of every pair of surfaces, (k dim, j)."""
+    parts = [_smooth_motions(part_of(problem, pair)) for pair in problem.pairs]
+    return np.asarray(la.block_diag(*parts))
+
+
+def _smooth_motions(problem: InterfaceProblem) -> np.ndarray:
     """(k dim, j <= dim^2): constant and linear functions of the place in every component: translations, tilts, stretches.
 
     On a closed line, which has no linear functions, the first cosine and sine take their place. Components that cannot move

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
-from contactopt.solving.preconditioners.grid import Grid, Product, Products, on_grid
+from contactopt.solving.preconditioners.grid import Grid, GridMap, GridMaps, on_grid
 
 INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
 
@@ -34,18 +34,27 @@ def norm(m: float, h: float) -> np.ndarray:
     return column
 
 
-def p21(problem: InterfaceProblem, still: np.ndarray) -> Products:
-    """Eqs (25) and (29) on the grid of the contacts."""
+def p21(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
+    """P21 of eq (25) or, in 3D, P31 of eq (29) on the grid of the contacts; `still` (k, dim) masks what cannot move."""
     return on_grid(problem, still, extended)
 
 
-def p22(problem: InterfaceProblem, still: np.ndarray) -> Products:
-    """Eq (26) on the contact line."""
+def p22(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
+    """P22 of eq (26) on the contact line; `still` (k, dim) masks what cannot move."""
     return on_grid(problem, still, inverse_of_extended)
 
 
-def extended(grid: Grid) -> tuple[Product, None]:
-    """Eq (25): E' Q_c E on a line; on a rectangle the sum of it along both directions, P31, eq (29)."""
+def extended(grid: Grid) -> tuple[GridMap, None]:
+    """P21 = E' Q_c E of eq (25) on a line; on a rectangle its sum along both directions, P31 of eq (29).
+
+    Parameters
+    ----------
+    grid : of the contacts
+
+    Returns
+    -------
+    The product of P with arrays (*shape, dim), and None because its inverse is not cheap.
+    """
     if grid.closed:
         symbol, smallest = closed_symbol(*grid.shape)
         return circular(np.maximum(symbol, smallest / 2)), None
@@ -53,10 +62,22 @@ def extended(grid: Grid) -> tuple[Product, None]:
     return lambda X: np.sum([line(X) for line in lines], axis=0), None
 
 
-def inverse_of_extended(grid: Grid) -> tuple[Product, Product]:
-    """Eq (26): (E' L_c^-1 Q_c E)^-1, a Toeplitz system solved by conjugate gradients; on a line only.
+def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
+    """P22 = (E' L_c^-1 Q_c E)^-1 of eq (26), a Toeplitz system solved by conjugate gradients.
 
-    h is the spacing over a quarter of the contact line's length, so that units do not matter.
+    The spacing h of eq (28) is measured in quarters of the contact line's length, so that units do not matter.
+
+    Parameters
+    ----------
+    grid : of the contacts, a line
+
+    Returns
+    -------
+    The products of P and of its inverse with arrays (k, dim).
+
+    Raises
+    ------
+    InputError : on a surface, where the paper defines no P22
     """
     if len(grid.shape) > 1:
         raise InputError("preconditioner 'p22' is for contact lines (2D); in 3D choose p21 or neumann.")
@@ -78,16 +99,17 @@ def inverse_of_extended(grid: Grid) -> tuple[Product, Product]:
 
 
 def closed_symbol(k: int) -> tuple[np.ndarray, float]:
-    """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, which needs no extension, and the least but zero.
+    """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the smallest of them that is not zero.
 
-    Where k is no power of two the column of eq (27) does not sum to zero: what is left is taken off.
+    A closed curve needs no extension. The eigenvalue of constant functions must be zero. Where k is no power of two, the
+    column of eq (27) does not sum to zero, and its sum is subtracted from every eigenvalue.
     """
     symbol = fft(seminorm(k / 2)).real
     symbol = symbol - symbol[0]
     return symbol, float(symbol[1:].min())
 
 
-def circular(symbol: np.ndarray) -> Product:
+def circular(symbol: np.ndarray) -> GridMap:
     """Circulant matrix with that (real, symmetric) symbol (k,) along the first axis."""
     return lambda X: np.asarray(ifft(symbol[:, None] * fft(X, axis=0), axis=0).real)
 
@@ -97,7 +119,7 @@ def closed_curve(k: int) -> int:
     return int(2 ** np.ceil(np.log2(k)))
 
 
-def restricted_circulant(symbol: np.ndarray, k: int, axis: int) -> Product:
+def restricted_circulant(symbol: np.ndarray, k: int, axis: int) -> GridMap:
     """E' C E along one axis of k nodes for the circulant matrix with that (real, symmetric) symbol."""
     n = 2 * (len(symbol) - 1)
 

@@ -13,8 +13,8 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import nodal_weights
 from contactopt.solving.preconditioners.constants import CELL, EDGE
 
-Product = Callable[[np.ndarray], np.ndarray]  # acts on arrays (*shape, dim)
-Products = tuple[Product, Product | None]  # with P and, where it is cheap, with P^-1
+GridMap = Callable[[np.ndarray], np.ndarray]  # linear map of arrays (*shape, dim)
+GridMaps = tuple[GridMap, GridMap | None]  # products with P and, where it is cheap, with P^-1
 EVEN = 1e-6  # relative difference of spacings that counts as none
 
 
@@ -23,8 +23,9 @@ class Grid:
     """Contacts on a line, a closed curve or a rectangular grid, in the order of C arrays of that shape.
 
     ticks    places along each direction [length]
-    held     (dim, directions, 2): component does not move at the first / last contact of that direction
-    weights  (k,) square roots of what takes the nodes' sizes out of Q, see nodal_weights
+    held     (dim, directions, 2): whether a component is held at the first and at the last contact of a direction
+    weights  (k,) weights w: the diagonal of Q is about proportional to 1 / w^2, because larger nodes give way less
+             (contactopt.problem.operators.nodal_weights)
     closed   whether the line returns to its start
     turn     (dim - 1, dim - 1) rotation from tangential components in the chart to those along the directions
     """
@@ -40,13 +41,26 @@ class Grid:
         return tuple(len(t) for t in self.ticks)
 
 
-def grid_of(problem: InterfaceProblem, still: np.ndarray) -> tuple[Grid, np.ndarray]:
-    """The grid of the contacts, and the order (k,) of the contacts in it; still (k, dim) masks what cannot move.
+def grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:
+    """Find the line, closed curve or rectangular grid on which the contacts lie.
 
-    It is found in the chart, where the grid may be turned by any angle. Raises InputError where there is none.
+    The search takes place in the chart, where a rectangular grid may be turned by any angle.
+
+    Parameters
+    ----------
+    problem : of k contacts; its chart and its nodal areas are used
+    held : (k, dim) mask of the components that cannot move
+
+    Returns
+    -------
+    Grid, and the contacts (k,) in its order.
+
+    Raises
+    ------
+    InputError : if the contacts lie on no such grid, or if it has fewer than 3 contacts a side
     """
     if problem.dim == 2:
-        return _line(problem, still)
+        return _line(problem, held)
     turn = _turn(problem.chart.places)
     x = turn @ problem.chart.places
     size = np.ptp(x, axis=1).max(initial=0.0)
@@ -64,9 +78,9 @@ def grid_of(problem: InterfaceProblem, still: np.ndarray) -> tuple[Grid, np.ndar
     if not full or np.any(np.diff(np.ravel_multi_index(places, shape)[order]) != 1):
         raise InputError("the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a side.")
     oblique = not np.array_equal(turn, np.eye(2))
-    if oblique and np.any(still[:, 1:].any(axis=1) & ~still[:, 1:].all(axis=1)):
+    if oblique and np.any(held[:, 1:].any(axis=1) & ~held[:, 1:].all(axis=1)):
         raise InputError("a grid at an angle to tangential directions that are held has no preconditioner.")
-    on_grid = still[order].reshape(*shape, problem.dim)
+    on_grid = held[order].reshape(*shape, problem.dim)
     ends = [[on_grid.take(end, axis).all(axis=0) for end in (0, -1)] for axis in range(2)]
     areas = problem.areas[order]
     cells = np.multiply.outer(*(cells_along(t) for t in ticks)).ravel()
@@ -75,12 +89,12 @@ def grid_of(problem: InterfaceProblem, still: np.ndarray) -> tuple[Grid, np.ndar
     return Grid(tuple(ticks), np.moveaxis(np.array(ends), 2, 0), weights, turn=turn if oblique else None), order
 
 
-def on_grid(problem: InterfaceProblem, still: np.ndarray, make: Callable[[Grid], Products]) -> Products:
+def on_grid(problem: InterfaceProblem, still: np.ndarray, make: Callable[[Grid], GridMaps]) -> GridMaps:
     """Products on arrays (k, dim) from those on the grid of the contacts (*shape, dim), which `make` gives."""
     grid, order = grid_of(problem, still)
     product, inverse = make(grid)
 
-    def placed(act: Product) -> Product:
+    def placed(act: GridMap) -> GridMap:
         def apply(x: np.ndarray) -> np.ndarray:
             x = x[order]
             if grid.turn is not None:
@@ -97,22 +111,22 @@ def on_grid(problem: InterfaceProblem, still: np.ndarray, make: Callable[[Grid],
     return placed(product), None if inverse is None else placed(inverse)
 
 
-def _line(problem: InterfaceProblem, still: np.ndarray) -> tuple[Grid, np.ndarray]:
+def _line(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:
     """The contacts in their order along a contact line, or around a closed one."""
     chart, order = problem.chart, problem.chart.order()
     ticks = chart.places[0, order]
     if len(ticks) < 3 or np.any(np.diff(ticks) <= 0):
         raise InputError("the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a side.")
     weights = nodal_weights(chart, problem.areas)[order]
-    held = still[order][[0, -1]].T[:, None, :] if not chart.closed else np.zeros((2, 1, 2), dtype=bool)
-    return Grid((ticks,), held, weights, chart.closed), order
+    ends = held[order][[0, -1]].T[:, None, :] if not chart.closed else np.zeros((2, 1, 2), dtype=bool)
+    return Grid((ticks,), ends, weights, chart.closed), order
 
 
 def _turn(places: np.ndarray) -> np.ndarray:
     """Rotation (2, 2) that lays the directions to the nearest neighbours of places (2, k) along the axes.
 
-    On a rectangular grid they are those of its sides; their angles are known up to quarter turns, of which the least is
-    taken: the identity, to the last digit, where the grid is along the axes already.
+    On a rectangular grid these are the directions of its sides. Their angle is known up to quarter turns only, and the
+    smallest of the possible angles is taken. A grid that lies along the axes already gives the identity to the last digit.
     """
     points = places.T
     if len(points) < 4:
@@ -127,6 +141,6 @@ def _turn(places: np.ndarray) -> np.ndarray:
 
 
 def cells_along(ticks: np.ndarray) -> np.ndarray:
-    """Length of the line that belongs to every tick: half-way to its neighbours, and as much beyond an end."""
+    """Length (k,) of the line that belongs to every tick: half-way to either neighbour, beyond an end as far as before it."""
     steps = np.diff(ticks)
     return np.concatenate([steps[:1], (steps[:-1] + steps[1:]) / 2, steps[-1:]])

@@ -18,7 +18,7 @@ from scipy.fft import dct, dst, fft, idct, idst
 
 from contactopt.problem import InterfaceProblem
 from contactopt.solving.preconditioners.constants import SOFT, SPLIT
-from contactopt.solving.preconditioners.grid import EVEN, Grid, Product, Products, cells_along, on_grid
+from contactopt.solving.preconditioners.grid import EVEN, Grid, GridMap, GridMaps, cells_along, on_grid
 
 # held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j + shift) / k
 TRANSFORMS = {
@@ -31,9 +31,11 @@ TRANSFORMS = {
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """The Laplacian -d^2/dx^2 along one side: transform to its eigenvectors and back, along an axis of an array.
+    """The Laplacian -d^2/dx^2 along one side of the grid, which has k contacts.
 
-    waves  (k,) squared wave numbers over that of the grid, 0 to 4;   squares  (k,) eigenvalues [1 / length^2]
+    waves     (k,) squared wave numbers times the squared spacing, from 0 to 4 [-]
+    squares   (k,) eigenvalues [1 / length^2]
+    forward   transforms an array to eigenvectors along one of its axes;   backward  is its inverse
     """
 
     waves: np.ndarray
@@ -77,21 +79,29 @@ def direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
     return Direction(waves, np.maximum(values, 0.0), along(vectors.T), along(vectors))
 
 
-def neumann(problem: InterfaceProblem, still: np.ndarray) -> Products:
-    """The root on the grid of the contacts, and its inverse."""
+def neumann(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
+    """The root on the grid of the contacts, and its inverse; `still` (k, dim) masks what cannot move."""
     return on_grid(problem, still, root_on_grid)
 
 
-def root_on_grid(grid: Grid) -> tuple[Product, Product]:
+def root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:
     """Square root of the Laplacian of the contacts, weighted by their sizes, and its inverse.
 
     The Laplacian maps constants to zero, which has no inverse. Half the smallest other eigenvalue of the root stands in
     its place.
+
+    Parameters
+    ----------
+    grid : of the contacts
+
+    Returns
+    -------
+    The products of the root and of its inverse with arrays (*shape, dim).
     """
     parts = [_root(grid, component) for component in range(len(grid.held))]
     weight = grid.weights.reshape(grid.shape)
 
-    def along(power: int) -> Product:
+    def along(power: int) -> GridMap:
         def product(X: np.ndarray) -> np.ndarray:
             out = np.empty(X.shape)
             for i, (root, directions) in enumerate(parts):
@@ -112,9 +122,10 @@ def root_on_grid(grid: Grid) -> tuple[Product, Product]:
 def _root(grid: Grid, component: int) -> tuple[np.ndarray, list[Direction]]:
     """Square root of the symbol of a component, without units, and the directions.
 
-    On a surface the Laplacian is that of bilinear elements, x + y - x y / 6 (a + 1 / a) / (...) in their waves. A half-space
-    gives way differently to tangential tractions that vary along their own direction and across it, by 1 - nu to 1, and
-    bilinear elements more so the shorter the wave.
+    On a surface the Laplacian is that of bilinear elements with sides 1 and a: where the waves along the two directions are
+    x and y, it is a x + y / a - (a + 1 / a) x y / 6. A half-space gives way less, by a factor of 1 - nu, to tangential
+    tractions that vary along their own direction than to those that vary across it. With bilinear elements the difference
+    is larger, the more so the shorter the wave.
     """
     held = grid.held[component]
     if grid.closed:

@@ -1,0 +1,117 @@
+"""Resultant forces and moments of every pair of surfaces, support and plate, in the coordinates of space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from contactopt.analysis.quantities import stick_width, width
+from contactopt.analysis.status import contact_status
+from contactopt.interface.charts import SymmetryPlane
+from contactopt.interface.reduction import Reduction
+from contactopt.problem import Solution, alone
+
+
+@dataclass(frozen=True, eq=False)
+class Resultant:
+    """A force (dim,) and its moment about the origin: (1,) about the third axis in 2D, (3,) in 3D."""
+
+    force: np.ndarray
+    moment: np.ndarray
+
+    @property
+    def table(self) -> dict[str, list[float]]:
+        """As lists, for files."""
+        return {"force": self.force.tolist(), "moment": self.moment.tolist()}
+
+
+def resultant(
+    points: np.ndarray, forces: np.ndarray, axisymmetric: bool, planes: tuple[SymmetryPlane, ...]
+) -> Resultant:
+    """Resultant of nodal forces (dim, m) at points (dim, m), those of all mirror images together or of whole rings.
+
+    Mirror images across `planes` and the parts of a ring balance each other but for what acts along the planes and along
+    the axis.
+    """
+    if axisymmetric:
+        return Resultant(np.array([0.0, forces[1].sum()]), np.zeros(1))
+    for plane in planes:
+        n, apart = plane.inward[:, None], plane.inward @ points - plane.offset
+        points = np.hstack([points, points - 2 * n * apart])
+        forces = np.hstack([forces, forces - 2 * n * (plane.inward @ forces)]) / 2
+    x, f = (np.pad(each, ((0, 3 - len(each)), (0, 0))) for each in (points, forces))
+    moment = np.cross(x, f, axis=0).sum(axis=1)
+    return Resultant(forces.sum(axis=1), moment if len(points) == 3 else moment[2:])
+
+
+def planes_of(reduction: Reduction) -> tuple[SymmetryPlane, ...]:
+    """The planes of symmetry of a scene whose bodies are parts of the whole ones; none where they are whole."""
+    if reduction.scene.copies == 1:
+        return ()
+    found: list[SymmetryPlane] = []
+    for plane in (plane for made in reduction.couplings for plane in made.planes):
+        if not any(abs(plane.inward @ other.inward) > 0.5 for other in found):
+            found.append(plane)
+    return tuple(found)
+
+
+def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:
+    """Contact forces on the upper bodies in the coordinates of space, (dim, k)."""
+    return np.asarray(np.einsum("kad,ka->dk", reduction.frames, solution.reactions))
+
+
+def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
+    """For every pair of surfaces the resultant of the contact forces on its upper body."""
+    forces, points = space_forces(reduction, solution), reduction.problem.coordinates
+    ring, planes = reduction.scene.kind == "axisymmetric", planes_of(reduction)
+    return {
+        pair.name: resultant(points[:, pair.contacts], forces[:, pair.contacts], ring, planes)
+        for pair in reduction.problem.pairs
+    }
+
+
+def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
+    """For every support and plate, as "body 'name', support 'boundary'", the resultant of its forces on the body."""
+    ring, planes = reduction.scene.kind == "axisymmetric", planes_of(reduction)
+    found = {}
+    displaced = reduction.displaced(solution.reactions, solution.multipliers)
+    for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
+        for name, (points, forces) in body.held_by(U, B.T @ solution.reactions.ravel()).items():
+            found[f"body '{body.name}', {name}"] = resultant(points, forces, ring, planes)
+    return found
+
+
+def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Solution]]:
+    """The reduction and solution of every pair by itself, for readers of its surface; the displacements of bodies need all pairs.
+
+    Where there is one pair only, it is all of the scene.
+    """
+    if len(reduction.problem.pairs) == 1:
+        return [(reduction, solution)]
+    made = []
+    for pair, coupling in zip(reduction.problem.pairs, reduction.couplings):
+        problem, own = alone(reduction.problem, solution, pair)
+        made.append((replace(reduction, problem=problem, couplings=(coupling,)), own))
+    return made
+
+
+def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
+    """`pairs` and `holders` of a summary: resultants, and for pairs forces, pressure and counts of contacts."""
+    pairs = {}
+    for (view, own), (name, found) in zip(views(reduction, solution), pair_resultants(reduction, solution).items()):
+        problem, r = view.problem, own.reactions
+        status, loaded = contact_status(problem, r), problem.areas > 0
+        pairs[name] = found.table | {
+            "normal_force": float(r[:, 0].sum()),
+            "max_pressure": float((r[loaded, 0] / problem.areas[loaded]).max(initial=0.0)),
+            "contact_half_width": width(view, own),
+            "stick_half_width": stick_width(view, own)[0],
+            "contacts": problem.contacts,
+            "open": int(status.open.sum()),
+            "stick": int(status.stick.sum()),
+            "slip": int(status.slip.sum()),
+        }
+    holders = {name: found.table for name, found in holder_resultants(reduction, solution).items()}
+    return {"pairs": pairs, "holders": holders}

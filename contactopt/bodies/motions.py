@@ -1,0 +1,160 @@
+"""Rigid motions that no support and no plate holds, and the forces that meet a resultant without making the body move.
+
+The stiffness A of a body that floats is singular: A Z = 0 for its free rigid motions Z (n, m). With m fixing unknowns left
+out, G = A^-1 (zero on the fixing unknowns) gives the displacement under forces in balance. Let S (n, m) be forces with
+Z' S = I. The compliance of the floating body is
+
+    C = (I - Z S') G (I - S Z') = G - Z Y' - Y Z',      Y = G S - Z (S' G S) / 2,
+
+which is symmetric, positive semidefinite and does not depend on the fixing unknowns: a resultant Z' F is met by the forces
+-S (Z' F), and displacements have no part S' U along the motions. Under balanced forces both do nothing. Here S is proportional to
+the inertia forces of the motions, S = M Z (Z' M Z)^-1 with the mass matrix M of unit density, so that C converges with the mesh (a point force
+would not) and the multiplier of a motion is the mean displacement of the body (inertia relief).
+
+Source: Farhat, Roux (1991), A method of finite element tearing and interconnecting and its parallel solution algorithm,
+Int. J. Numer. Meth. Engng 32, 1205-1227, for floating bodies whose motions are multipliers of the interface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+import skfem
+from skfem.helpers import dot
+
+from contactopt.bodies.elements import weight_at
+from contactopt.errors import InputError
+
+HELD = 1e-12  # mean square of a motion (largest displacement one) over the held unknowns below which nothing holds it
+PURE = 1e-9  # by how much a motion may miss the free ones and still count as one of them
+EXACT = 1e-9  # largest |A Z| over |A| |Z|: a free motion strains nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """Free rigid motions of a body, m of them.
+
+    fields  (n, m) displacements Z, zero at unknowns that are held; the largest displacement of a node is about one, so that
+            multipliers are displacements [length]
+    names   what each of them is, for messages
+    fixing  (m,) unknowns that hold the body where its stiffness has to be solvable
+    forces  (n, m) nodal forces S of unit resultants, Z' S = I
+    """
+
+    fields: np.ndarray
+    names: tuple[str, ...]
+    fixing: np.ndarray
+    forces: np.ndarray
+
+
+def rigid_motions(kind: str, components: tuple[str, ...], x: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+    """All rigid motions of points x (dim, k) as displacements (dim, k, m), and their names.
+
+    Translations have length one; rotations are about the middle of the points and move the furthest of them by one. In
+    an axisymmetric scene there is one motion, along the axis.
+    """
+    dim = len(components)
+    if kind == "axisymmetric":
+        field = np.zeros((*x.shape, 1))
+        field[1] = 1.0
+        return field, (f"translation along {components[1]}",)
+    made, names = [], []
+    for i, component in enumerate(components):
+        made.append(np.zeros_like(x))
+        made[-1][i] = 1.0
+        names.append(f"translation along {component}")
+    centred = x - x.mean(axis=1, keepdims=True)
+    size = np.linalg.norm(centred, axis=0).max() or 1.0
+    for i in range(dim):
+        for j in range(i):
+            made.append(np.zeros_like(x))
+            made[-1][i], made[-1][j] = centred[j] / size, -centred[i] / size
+            names.append(f"rotation in the {components[j]}-{components[i]} plane")
+    return np.stack(made, axis=-1), tuple(names)
+
+
+def free_motions(
+    kind: str,
+    components: tuple[str, ...],
+    basis: skfem.CellBasis,
+    unknowns: np.ndarray,
+    held: np.ndarray,
+    weight: tuple[float, bool],
+) -> Motions:
+    """The rigid motions of a body that leave all held unknowns at rest.
+
+    Parameters
+    ----------
+    kind, components
+        Of the scene.
+    basis, weight
+        Displacement basis, and the measure of its integrals (contactopt.bodies.elements.weight_at).
+    unknowns
+        (dim, nodes) displacement unknowns of every node.
+    held
+        (n,) mask of the unknowns that supports or plates prescribe.
+    """
+    x = basis.doflocs[:, unknowns[0]]
+    rigid, labels = rigid_motions(kind, components, x)
+    R = np.zeros((basis.N, len(labels)))
+    for mode, column in zip(np.moveaxis(rigid, 2, 0), R.T):
+        column[unknowns] = mode
+    combined, names = _kernel(R[held], labels)
+    Z = R @ combined
+    Z[held] = 0.0
+    if not len(names):
+        return Motions(Z, (), np.zeros(0, dtype=int), Z.copy())
+    free = np.flatnonzero(~held)
+    fixing = free[la.qr(Z[free].T, pivoting=True, mode="r")[1][: len(names)]]
+    inertia = np.stack([_inertia(basis, z, weight) for z in Z.T], axis=1)
+    inertia[held] = 0.0
+    return Motions(Z, names, np.sort(fixing), inertia @ np.linalg.inv(Z.T @ inertia))
+
+
+def _kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Combinations (m, j) of m motions that leave the held unknowns (h, m) at rest, and the name of each.
+
+    A translation or rotation that is free by itself is a column of its own.
+    """
+    count = len(labels)
+    values, vectors = np.linalg.eigh(held.T @ held)
+    kernel = vectors[:, values < HELD * len(held)] if len(held) else np.eye(count)
+    pure = np.flatnonzero(np.abs(1 - np.sum(kernel**2, axis=1)) < PURE)
+    columns = [np.eye(count)[:, i] for i in pure]
+    rest = kernel - np.eye(count)[:, pure] @ kernel[pure]
+    u, sizes, _ = np.linalg.svd(rest, full_matrices=False)
+    columns += [column / column[np.argmax(np.abs(column))] for column in u[:, sizes > 0.5].T]
+    made = np.stack(columns, axis=1) if columns else np.zeros((count, 0))
+    return made, tuple(_name(column, labels) for column in made.T)
+
+
+def _name(column: np.ndarray, labels: tuple[str, ...]) -> str:
+    """The name of a combination of motions: that of its rotation, if it has one, otherwise of its largest translation."""
+    turning = np.array([label.startswith("rotation") for label in labels])
+    size = np.abs(column) * np.where(turning, 1e3, 1.0) * (np.abs(column) > 1e-3 * np.abs(column).max())
+    return labels[int(np.argmax(size))]
+
+
+def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: tuple[float, bool]) -> np.ndarray:
+    """Nodal forces (n,) of the field as a force per volume."""
+
+    @skfem.LinearForm
+    def form(v, w):  # type: ignore[no-untyped-def]
+        return dot(w["field"], v) * weight_at(weight, w.x)
+
+    return np.asarray(form.assemble(basis, field=basis.interpolate(field)))
+
+
+def check_free(name: str, A: sp.csr_matrix, motions: Motions) -> None:
+    """The stiffness must not resist the free motions: InputError where rounding of extreme coordinates makes it do so."""
+    if not len(motions.names):
+        return
+    error = np.abs(A @ motions.fields).max(axis=0) / (np.abs(A.diagonal()).max() * np.abs(motions.fields).max(axis=0))
+    if error.max() > EXACT:
+        raise InputError(
+            f"body '{name}': its stiffness resists the rigid motion '{motions.names[int(np.argmax(error))]}'; move the mesh "
+            "nearer to the origin."
+        )

@@ -1,0 +1,206 @@
+"""A contact surface as the mortar coupling sees it: faces, the linear cells of its multipliers, places on it.
+
+A face is described by the nodes of its displacement; its geometry is interpolated from their coordinates with the same
+shape functions, which is exact for straight and for isoparametric elements alike. The multipliers live on linear cells,
+the same as on one body alone (contactopt.bodies.elements): halves of lines, quarters of squares, whole triangles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import skfem
+
+from contactopt.bodies.elements import FACES, face_nodes
+
+# kind of the elements -> corners of a face, shape functions of the displacement by degree
+_SHAPES = {
+    "RefTri": (2, {1: skfem.ElementLineP1(), 2: skfem.ElementLineP2()}),
+    "RefQuad": (2, {1: skfem.ElementLineP1(), 2: skfem.ElementLineP2()}),
+    "RefTet": (3, {1: skfem.ElementTriP1(), 2: skfem.ElementTriP2()}),
+    "RefHex": (4, {1: skfem.ElementQuad1(), 2: skfem.ElementQuad2()}),
+}
+_QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a triangle with nodes on its edges
+STRAIGHT = 1e-9  # a node on an edge is at its middle within this fraction of the face
+NEWTON, STEPS = 1e-13, 30  # accuracy of a place on a face, in its own coordinates
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """The candidate contact boundary of one body.
+
+    name    of the body
+    kind    of its elements, the key of contactopt.bodies.elements.FACES
+    degree  of the displacement, 1 or 2
+    points  (dim, n) coordinates of all nodes of the body [length]
+    faces   (f, j) nodes of every face: its corners in cyclic order, then the nodes on its edges, then its centre
+    turn    (f,) +1 where the normal of the corners' order (in 2D: the direction of the face turned clockwise) points
+            outward, -1 where it points inward
+    weight  of the integrals: a factor, and whether it is multiplied by r (contactopt.bodies.elements.weight_at)
+    curve   function (dim, m) -> (dim, m) that puts points of the faces on the true surface; None: the faces are it
+    """
+
+    name: str
+    kind: str
+    degree: int
+    points: np.ndarray
+    faces: np.ndarray
+    turn: np.ndarray
+    weight: tuple[float, bool] = (1.0, False)
+    curve: Callable[[np.ndarray], np.ndarray] | None = None
+
+    @property
+    def dim(self) -> int:
+        """Of space."""
+        return len(self.points)
+
+    @property
+    def corners(self) -> int:
+        """Corners of a face."""
+        return _SHAPES[self.kind][0]
+
+    @property
+    def places(self) -> np.ndarray:
+        """(dim - 1, j) reference coordinates of the nodes of a face."""
+        return np.asarray(FACES[self.kind][2][:, : self.faces.shape[1]])
+
+    @property
+    def cells(self) -> np.ndarray:
+        """(c, v) nodes of a face that are the vertices of its linear cells."""
+        return np.arange(self.corners)[None] if self.degree == 1 else np.asarray(FACES[self.kind][3])
+
+    @cached_property
+    def curved(self) -> bool:
+        """Whether a node on an edge or within a face lies off the linear interpolation of the corners."""
+        count = self.corners
+        hats = evaluate(FACES[self.kind][1], self.places)[0][:count, count:]
+        nodes = self.points[:, self.faces]
+        off = nodes[:, :, count:] - nodes[:, :, :count] @ hats
+        size = np.ptp(nodes[:, :, :count], axis=2).max(axis=0)
+        return bool(np.any(np.abs(off) > STRAIGHT * size[:, None]))
+
+    @cached_property
+    def distorted(self) -> bool:
+        """Whether the map from the reference face is more than affine: no polynomial is one in the other's coordinates."""
+        nodes = self.points[:, self.faces]
+        size = np.ptp(nodes, axis=2).max(axis=0)
+        skew = nodes[:, :, 0] - nodes[:, :, 1] + nodes[:, :, 2] - nodes[:, :, 3] if self.corners == 4 else 0 * size
+        return self.curved or bool(np.any(np.abs(skew) > STRAIGHT * size))
+
+    def shapes(self, at: np.ndarray) -> np.ndarray:
+        """(j, m) shape functions of the displacement at reference coordinates (dim - 1, m)."""
+        return evaluate(_SHAPES[self.kind][1][self.degree], at)[0]
+
+    def hats(self, cell: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """(v, m) hat functions of the linear cell (m,) of a face at reference coordinates (dim - 1, m) of the face."""
+        first, last = self.places[:, self.cells[:, 0]], self.places[:, self.cells[:, [1, -1]]].max(axis=2)
+        width = np.where(last > first, last - first, 1.0)
+        local = (at - first[:, cell]) / width[:, cell]
+        return evaluate(FACES[self.kind][1], local)[0]
+
+    def locations(self, face: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places (dim, m) on faces (m,) at reference coordinates (dim - 1, m), and tangents (dim, dim - 1, m) there."""
+        element = _SHAPES[self.kind][1][self.degree] if self.curved else FACES[self.kind][1]
+        N, slope = evaluate(element, at)
+        place, tangents = np.zeros((self.dim, len(face))), np.zeros((self.dim, len(at), len(face)))
+        for node, value, rate in zip(self.faces[:, : len(N)].T, N, slope):
+            x = self.points[:, node[face]]
+            place += x * value
+            tangents += x[:, None] * rate
+        return place, tangents
+
+    def true(self, x: np.ndarray) -> np.ndarray:
+        """Points (dim, m) of the faces moved to the true surface."""
+        return x if self.curve is None else np.asarray(self.curve(x), dtype=float)
+
+    def locate(self, face: np.ndarray, x: np.ndarray, axes: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Reference coordinates (dim - 1, m) on faces (m,) where axes (m, dim - 1, dim) see the points x (dim, m).
+
+        Newton's iteration from `start`; a single step is exact on affine faces.
+        """
+        at = np.array(np.broadcast_to(start, (self.dim - 1, len(face))))
+        seen = axes.transpose(1, 0, 2)
+        for _ in range(STEPS):
+            here, tangents = self.locations(face, at)
+            apart = x - here
+            step = _solve(
+                [
+                    [sum(a * t for a, t in zip(axis.T, tangent)) for tangent in tangents.transpose(1, 0, 2)]
+                    for axis in seen
+                ],
+                [sum(a * d for a, d in zip(axis.T, apart)) for axis in seen],
+            )
+            at = np.clip(at + step, -2.0, 3.0)
+            if np.abs(step).max(initial=0.0) < NEWTON or not (self.distorted):
+                break
+        return at
+
+
+def _solve(A: list[list[np.ndarray]], b: list[np.ndarray]) -> np.ndarray:
+    """Solutions (n, m) of m systems of one or two equations, with entries A[row][column] (m,)."""
+    if len(b) == 1:
+        return np.stack([b[0] / A[0][0]])
+    (a00, a01), (a10, a11) = A
+    return np.stack([a11 * b[0] - a01 * b[1], a00 * b[1] - a10 * b[0]]) / (a00 * a11 - a01 * a10)
+
+
+def evaluate(element: skfem.Element, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shape functions (j, m) and their derivatives (j, dim - 1, m) at reference coordinates (dim - 1, m)."""
+    values = [element.lbasis(at, j) for j in range(len(element.doflocs))]
+    value = np.stack([np.broadcast_to(v, at.shape[1:]) for v, _ in values])
+    return value, np.stack([np.broadcast_to(np.asarray(s).reshape(len(at), -1), at.shape) for _, s in values])
+
+
+def faces_of(
+    name: str,
+    basis: skfem.CellBasis,
+    degree: int,
+    facets: np.ndarray,
+    weight: tuple[float, bool],
+    points: np.ndarray,
+    curve: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> Faces:
+    """The faces of some facets of a body's mesh.
+
+    Parameters
+    ----------
+    basis   of the displacement of that degree
+    facets  (f,) numbers of the facets in the mesh of the basis
+    points  (dim, n) coordinates of all nodes of the body [length]
+    name, weight, curve  as in Faces
+    """
+    nodes, normals = face_nodes(basis, degree, facets)
+    kind = basis.mesh.refdom.__name__
+    made = Faces(name, kind, degree, points, nodes, np.ones(len(nodes)), weight, curve)
+    return replace(made, turn=np.sign(np.sum(face_normals(made) * normals, axis=0)))
+
+
+def face_normals(surface: Faces) -> np.ndarray:
+    """(dim, f) unit normals at the middle of every face, outward."""
+    middle = surface.places[:, : surface.corners].mean(axis=1)
+    count = len(surface.faces)
+    tangents = surface.locations(np.arange(count), np.repeat(middle[:, None], count, axis=1))[1]
+    normal = cross(tangents) * surface.turn
+    return np.asarray(normal / np.linalg.norm(normal, axis=0))
+
+
+def cross(tangents: np.ndarray) -> np.ndarray:
+    """Normals (dim, m), as long as the surface is stretched, of tangents (dim, dim - 1, m)."""
+    if len(tangents) == 2:
+        return np.stack([tangents[1, 0], -tangents[0, 0]])
+    return np.cross(tangents[:, 0], tangents[:, 1], axis=0)
+
+
+def patches(surface: Faces, own: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Polygons that stand for a face when surfaces are cut: their vertices among its nodes (p, v), their cell (p,).
+
+    Those of the side with the multipliers never reach over two of its cells.
+    """
+    if surface.curved and surface.kind == "RefTet":
+        return _QUARTERS, np.zeros(4, dtype=int)
+    if own or surface.curved:
+        return surface.cells, np.arange(len(surface.cells))
+    return np.arange(surface.corners)[None], np.zeros(1, dtype=int)

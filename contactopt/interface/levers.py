@@ -1,0 +1,68 @@
+"""The rotation of a surface around its contacts, and the levers by which it carries displacements (contactopt.interface.mortar)."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.interface.faces import Faces
+
+SHARE = 1 / 8  # of the size of a contact's cells: larger gaps are levers of the geometry, not of the faces
+ROUNDING = 1e-11  # shorter levers, over the size of faces, are rounding
+
+
+def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """The levers l_i (dim, k) [length]: the part of e_i that is no gap, and a share of the gap.
+
+    Parameters
+    ----------
+    e      (dim, k) vectors from where forces act on the other side to where they act on the own side [length]
+    up     (dim, k) unit normals along which e opens the gap
+    gap    (k,) initial gap [length]
+    sizes  (k,) sizes of the contacts' cells [length]
+    """
+    limit = SHARE * sizes
+    lever = e - up * (gap - np.clip(gap, -limit, limit))
+    scale = ROUNDING * max(sizes.max(), np.abs(e).max())
+    return np.asarray(np.where(np.linalg.norm(lever, axis=0) > scale, lever, 0.0))
+
+
+def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[list[sp.csr_matrix]]:
+    """Matrices [c][d] (k, n) from displacements d of the own nodes to component c of omega_i x l_i.
+
+    omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas of the faces.
+    """
+    f, size = len(own.faces), own.points.shape[1]
+    corners = own.points[:, own.faces[:, : own.corners]]
+    radius = np.linalg.norm(corners - corners.mean(axis=2, keepdims=True), axis=0).max(axis=1)
+    columns = np.repeat(np.arange(f), own.faces.shape[1])
+    incident = sp.csr_matrix((np.ones(own.faces.size), (own.faces.ravel(), columns)), (size, f))
+    needed = sp.diags(np.any(lever != 0, axis=0).astype(float))
+    around = sp.csr_matrix(needed @ incident[nodes] @ sp.diags(radius ** (own.dim - 1)) @ incident.T)
+    return _rotations(around, own.points, lever)
+
+
+def _rotations(around: sp.csr_matrix, points: np.ndarray, lever: np.ndarray) -> list[list[sp.csr_matrix]]:
+    """As above, from the weights (k, n) of the nodes around every contact; in the plane, embedded in space."""
+    dim, k = lever.shape
+    w = sp.coo_matrix(around)
+    active = w.data > 0
+    i, j, weight = w.row[active], w.col[active], w.data[active]
+    total = np.bincount(i, weight, k)
+    centre = np.stack([np.bincount(i, weight * x[j], k) for x in points]) / np.where(total > 0, total, 1.0)
+    rho = points[:, j] - centre[:, i]
+    cross3 = np.zeros((len(i), 3, 3))  # rho x
+    full = np.zeros((3, len(i)))
+    full[:dim] = rho
+    cross3[:, 0, 1], cross3[:, 0, 2], cross3[:, 1, 2] = -full[2], full[1], -full[0]
+    cross3 -= cross3.transpose(0, 2, 1)
+    moments = -np.einsum("g,gab,gbc->gac", weight, cross3, cross3)
+    J = np.stack([np.bincount(i, m, k) for m in moments.reshape(len(i), 9).T], axis=1).reshape(k, 3, 3)
+    inverse = np.linalg.pinv(J, rcond=1e-10, hermitian=True)
+    arm = np.zeros((k, 3, 3))  # -(lever x) = x lever
+    tall = np.zeros((3, k))
+    tall[:dim] = lever
+    arm[:, 0, 1], arm[:, 0, 2], arm[:, 1, 2] = tall[2], -tall[1], tall[0]
+    arm -= arm.transpose(0, 2, 1)
+    values = np.einsum("gab,gbc,gcd,g->gad", arm[i], inverse[i], cross3, weight)
+    return [[sp.csr_matrix((values[:, c, d], (i, j)), around.shape) for d in range(dim)] for c in range(dim)]

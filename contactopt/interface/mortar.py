@@ -1,0 +1,200 @@
+"""Mortar coupling of two surfaces whose nodes do not match, with dual multipliers.
+
+One side, the finer one unless told otherwise, carries the contacts. Its linear cells (contactopt.interface.faces) have
+hat functions phi_i; on the part G of every cell that the other side covers,
+
+    a_i = int_G phi_i,    psi_i linear on the cell,    int_G psi_i phi_j = delta_ij a_i,
+
+the dual basis of the covered part. With the shape functions N_j of the own side and N'_j of the other, evaluated at the
+places that face each other,
+
+    W_ij = int_G psi_i N_j / a_i,    W'_ij = int_G psi_i N'_j / a_i,    u_i = W_ij u_j - W'_ij u'_j,
+
+and a contact force r_i acts by r_i W_ij on the own side, by -r_i W'_ij on the other. The functional psi_i / a_i of a field
+is the value at contact i of its best linear fit on the covered part. Hence:
+
+* Rows of W and of W' add up to one, so that forces are equal and opposite.
+* The psi_i add up to one, so that a uniform pressure, r_i = p a_i, gives every node of both sides exactly the integral of
+  its shape function: the patch test. It holds on partly covered faces too.
+* A contact outside the other surface, whose cell is partly covered, keeps its place: fields are continued linearly to it.
+  Contacts without any covered cell are left out, and those that a covered part hardly reaches (WEAK) pass their share of
+  it on to the strongest contact of the same cell.
+
+**Moments.** Forces act at W x and W' x'. The vector e_i = W_ij x_j - W'_ij x'_j between these places is zero where the
+surfaces lie on each other, but not where both are polygons inscribed in one curve; the moment of interface forces is the
+sum of e_i x r_i. It has a part that belongs to the geometry: a gap g_i closes along the normal before forces arise, so
+that e_i - g_i n_i is the lever that remains in contact. This rest is removed by evaluating the displacement of the own
+side at the other end of the lever, as a rotating surface carries it there:
+
+    u_i = W u - W' u' - omega_i(u) x l_i,      omega_i(u) = J^-1 sum_j w_j rho_j x u_j,   J = sum_j w_j (rho_j^2 - rho_j rho_j'),
+
+with omega_i the mean rotation of the nodes of the faces around contact i, rho_j their places from their centre, w_j the
+areas of the faces. It is exact for rigid motions, so that these give u = 0 at l_i = e_i, and by transposition forces on both bodies have
+no resultant moment. Since the lever is of second order in the size of the faces, so is what it changes. l_i also
+contains the gap itself, but at most an eighth of the size of a face (levers.SHARE): an arc deviates from a chord as long as
+its radius by about that much, so that polygons are in equilibrium whether their curve is known or not, and the rest of a
+larger gap is left to the geometry. In an axisymmetric scene moments vanish by symmetry, and no lever is needed.
+
+**Contacts that are supported.** Where a support holds a component at a contact's node, that component of u_i is taken from
+this node alone, and from the other body at the place that faces it (`alone`); on a plane of symmetry both are at
+rest. The cone of the contact is untouched.
+
+Sources: Wohlmuth (2000), A mortar finite element method using dual spaces for the Lagrange multiplier, SIAM J. Numer. Anal.
+38, 989-1012; Popp, Gitterle, Gee, Wall (2010), A dual mortar approach for 3D finite deformation contact with consistent
+linearization, Int. J. Numer. Meth. Engng 83, 1428-1465; Cichosz, Bischoff (2011), Consistent treatment of boundaries with
+mortar contact formulations using dual Lagrange multipliers, Comput. Methods Appl. Mech. Engrg 200, 1317-1332; Puso (2004),
+A 3D mortar method for solid mechanics, Int. J. Numer. Meth. Engng 59, 315-336 (rigid motions of curved interfaces).
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import KDTree
+from skfem.quadrature import get_quadrature
+
+from contactopt.bodies.elements import FACES
+from contactopt.errors import InputError
+from contactopt.interface.dual import collect, integrate, tidy
+from contactopt.interface.faces import Faces, cross, evaluate
+from contactopt.interface.levers import levers, rotations_times
+from contactopt.interface.segments import Overlap, overlap
+
+OVERLAP = 1e-9  # initial overlap, over the extent of the contact surface, that is reported
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Mortar:
+    """k contacts between two surfaces; of every pair, the upper body comes first.
+
+    own      0 or 1: the body whose nodes carry the contacts
+    nodes    (k,) these nodes
+    areas    (k,) areas of the covered parts, with the weight of the integrals
+    normals  (dim, k) unit normals, outward from the lower body
+    gap      (k,) initial gap [length]
+    points   (dim, k) positions of the nodes
+    weights  two (k, nodes of the body): what the displacement of the nodes contributes to that of the contacts
+    alone    two (k, nodes of the body): the displacement at the contact's own node, and at the place facing it
+    lever    (dim, k) l_i, from the other body to the own one [length]; zero where the surfaces lie on each other
+    carried  [c][d] (k, nodes of the own body): what displacements d contribute to component c of omega_i x l_i; empty
+             where all levers are zero
+    """
+
+    own: int
+    nodes: np.ndarray
+    areas: np.ndarray
+    normals: np.ndarray
+    gap: np.ndarray
+    points: np.ndarray
+    weights: tuple[sp.csr_matrix, sp.csr_matrix]
+    alone: tuple[sp.csr_matrix, sp.csr_matrix]
+    lever: np.ndarray
+    carried: list[list[sp.csr_matrix]]
+
+    def components(self, body: int, held: np.ndarray) -> list[list[sp.csr_matrix]]:
+        """Matrices [c][d] (k, nodes): what displacements d of the nodes of a body contribute to component c of the contacts.
+
+        The relative displacement is that of the upper body, 0, less that of the lower one, 1.
+
+        Parameters
+        ----------
+        held  (dim, k) the components that supports hold at the contacts' nodes on the own body
+        """
+        dim = len(self.lever)
+        W, alone = self.weights[body], self.alone[body]
+        made = [[sp.csr_matrix(W.shape)] * dim for _ in range(dim)]
+        for c in range(dim):
+            made[c][c] = W - sp.diags(held[c].astype(float)) @ (W - alone)
+            if body == self.own and self.carried:
+                free = sp.diags((~held[c]).astype(float))
+                made[c] = [there - free @ part for there, part in zip(made[c], self.carried[c])]
+        return made
+
+
+def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
+    """Contacts between two surfaces.
+
+    own  'upper' or 'lower': the body that carries the contacts; None: the one with more contacts where they face each other
+    Raises InputError if the surfaces face each other nowhere.
+    """
+    if own not in (None, "upper", "lower"):
+        raise InputError(f"the side that carries the contacts must be 'upper', 'lower' or None; got {own!r}.")
+    pair = (upper, lower)
+    first = 0 if own == "upper" else 1
+    mine, theirs = pair[first], pair[1 - first]
+    normals, sizes = contact_normals(mine)
+    points = overlap(mine, theirs, normals)
+    if own is None and _contacts(theirs, points.face) > _contacts(mine, points.cell // len(mine.cells)):
+        return mortar(upper, lower, "upper")
+    sign = 1.0 if first == 1 else -1.0  # normals leave the lower body
+    if not len(points.cell):
+        raise InputError(
+            f"the contact boundaries of body '{upper.name}' and body '{lower.name}' face each other nowhere; "
+            "check the boundaries' names, the bodies' positions, and which of them is the upper one."
+        )
+    sums = integrate(mine, theirs, points)
+    n = sign * normals[:, sums.nodes]
+    gap = -sign * np.sum(n * sums.apart, axis=0)
+    lever = np.zeros_like(n)
+    if not mine.weight[1]:
+        e = sums.own @ mine.points.T - sums.other @ theirs.points.T
+        lever = levers(e.T, -sign * n, gap, sizes[sums.nodes])
+    carried = rotations_times(lever, mine, sums.nodes) if np.any(lever) else []
+    x = mine.points[:, sums.nodes]
+    if sums.least < -OVERLAP * np.ptp(x, axis=1).max():
+        where = ", ".join(f"{c:.4g}" for c in sums.nearest)
+        _log.warning(
+            "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)", upper.name, lower.name, -sums.least, where
+        )
+    weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, sums.nodes)
+    if first == 1:
+        weights, alone = weights[::-1], alone[::-1]
+    return Mortar(first, sums.nodes, sums.areas, n, gap, x, weights, alone, lever, carried)
+
+
+def _contacts(surface: Faces, faces: np.ndarray) -> int:
+    """Number of contacts on some faces of a surface."""
+    return len(np.unique(surface.faces[np.unique(faces)][:, surface.cells]))
+
+
+def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
+    """Outward unit normals (dim, n), integrals of hat functions times normals, at contact nodes; sizes (n,) of the cells."""
+    n, count = surface.points.shape[1], len(surface.faces)
+    total, area = np.zeros(surface.points.shape), np.zeros(n)
+    reference, hat = FACES[surface.kind][:2]
+    at, share = get_quadrature(reference, 4)
+    phi = evaluate(hat, at)[0]
+    share = share / len(surface.cells)  # of the reference face
+    for cell in surface.cells:
+        places = np.tile(surface.places[:, cell] @ phi, count)
+        face = np.repeat(np.arange(count), at.shape[1])
+        normal = cross(surface.locations(face, places)[1]) * surface.turn[face]
+        split = normal.reshape(len(normal), count, -1)
+        length = np.linalg.norm(split, axis=0)
+        for v, corner in enumerate(cell):
+            node = surface.faces[:, corner]
+            area += np.bincount(node, length @ (phi[v] * share), n)
+            for d in range(len(total)):
+                total[d] += np.bincount(node, split[d] @ (phi[v] * share), n)
+    normals = np.divide(total, np.linalg.norm(total, axis=0), where=area > 0, out=np.zeros_like(total))
+    return normals, area ** (1 / (surface.dim - 1))
+
+
+def _alone(own: Faces, other: Faces, points: Overlap, nodes: np.ndarray) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """The own node of every contact, and the shape functions of the other side at the place that faces it."""
+    k = len(nodes)
+    mine = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), (k, own.points.shape[1]))
+    x = own.points[:, nodes]
+    near = KDTree(own.locations(points.cell // len(own.cells), points.at)[0].T).query(x.T)[1]
+    there = other.locate(points.face[near], x, points.axes[near], points.there[:, near])
+    there = np.clip(there, 0.0, 1.0)
+    if other.corners == 3:
+        there /= np.maximum(there.sum(axis=0), 1.0)
+    N = other.shapes(there)
+    theirs = collect(N.T[:, None, :], np.arange(k)[:, None], other.faces[points.face[near]], (k, other.points.shape[1]))
+    return mine, tidy(theirs)

@@ -1,0 +1,85 @@
+"""The coupling of bodies whose contact nodes do not match: contacts on one side, integrals over the overlap of both."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.bodies.protocol import AssembledBody, Mesh, Surface
+from contactopt.errors import InputError
+from contactopt.interface.charts import ContactPoints, lay_out, symmetry_planes
+from contactopt.interface.coupling import Coupling, renumbered
+from contactopt.interface.faces import Faces, faces_of
+from contactopt.interface.mortar import Mortar, mortar
+from contactopt.scenes.contact import Contact
+from contactopt.scenes.scene import Scene
+
+
+def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody) -> Coupling:
+    """The mortar coupling of two bodies with meshes (contactopt.interface.mortar), numbered along the chart.
+
+    The contacts are carried by the side that the pair names, otherwise by that with more contacts where they face each other.
+
+    Parameters
+    ----------
+    scene
+        The kind of the scene and its law.
+    pair
+        The pair of surfaces.
+    upper, lower
+        The two bodies, both with a mesh.
+
+    Returns
+    -------
+    Coupling
+        One contact for each node of that body that faces the other one.
+
+    Raises
+    ------
+    InputError
+        If a body has no mesh on its contact surface, or if the surfaces face each other nowhere.
+    """
+    meshes = [_mesh(body.surface(name)) for body, name in zip((upper, lower), pair.surfaces)]
+    sides = [_faces(body.name, mesh) for body, mesh in zip((upper, lower), meshes)]
+    m = mortar(sides[0], sides[1], pair.carrier)
+    mine, theirs = meshes[m.own], meshes[1 - m.own]
+    held = mine.held[mine.unknowns[:, m.nodes]]
+    still = np.stack([m.alone[1 - m.own] @ ~theirs.held[row] == 0 for row in theirs.unknowns])
+    cells = _cells(sides[m.own], m.nodes)
+    contacts = ContactPoints(m.points, m.normals, m.areas, cells, held & still, m.gap)
+    chart, frames, order = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
+    maps = [_map(m, i, mesh, held, frames, order) for i, mesh in enumerate(meshes)]
+    areas, places, planes = m.areas[order], m.points[:, order], tuple(symmetry_planes(contacts))
+    return Coupling(maps[0], maps[1], frames, m.gap[order], areas, places, chart, renumbered(cells, order), planes)
+
+
+def _mesh(surface: Surface) -> Mesh:
+    if surface.mesh is None:
+        raise InputError(f"body '{surface.body}' has no mesh on its contact surface; couple it by matching nodes.")
+    return surface.mesh
+
+
+def _faces(name: str, mesh: Mesh) -> Faces:
+    return faces_of(name, mesh.basis, mesh.degree, mesh.facets, mesh.measure, mesh.locations, mesh.curve)
+
+
+def _cells(side: Faces, nodes: np.ndarray) -> np.ndarray:
+    """(v, c) contacts at the corners of the cells whose corners all carry contacts."""
+    number = np.full(side.points.shape[1], -1)
+    number[nodes] = np.arange(len(nodes))
+    cells = number[side.faces[:, side.cells].reshape(-1, side.cells.shape[1])]
+    return np.asarray(cells[np.all(cells >= 0, axis=1)].T)
+
+
+def _map(m: Mortar, body: int, mesh: Mesh, held: np.ndarray, frames: np.ndarray, order: np.ndarray) -> sp.csr_matrix:
+    """T (k dim, n): the body's unknowns -> its part of the displacement of the contacts, in the frames and their order."""
+    k, dim = frames.shape[:2]
+    rows, columns = np.arange(k * dim), np.repeat(np.arange(k), dim)
+    T = sp.csr_matrix((k * dim, len(mesh.held)))
+    for c, row in enumerate(m.components(body, held)):
+        turn = sp.csr_matrix((frames[:, :, c].ravel(), (rows, columns)), (k * dim, k))
+        for unknowns, part in zip(mesh.unknowns, row):
+            entries = sp.coo_matrix(turn @ part[order])
+            T = T + sp.csr_matrix((entries.data, (entries.row, unknowns[entries.col])), T.shape)
+    T.eliminate_zeros()
+    return T

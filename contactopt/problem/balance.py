@@ -1,0 +1,149 @@
+"""Loads that no contact forces can balance, told before anything is solved.
+
+Every solution has forces r in the friction cones K with V' r + s = 0. A motion z (p,) of the free bodies that every contact
+lets pass, V z in the dual cone of K, g_n >= mu |g_t| at each contact, has z' V' r >= 0 for all such r. Where it moves the
+loads forward, s' z > 0, this contradicts z' V' r = -s' z: there is no solution, and the bodies fly apart, slide off or
+topple along z. Where nonnegative least squares finds forces that balance the loads there is no such motion. Otherwise the search
+is a linear program with a polygon inside each cone; what it finds is checked on its own.
+
+Source: Farkas' lemma for cones; Boyd, Vandenberghe (2004), Convex Optimization, section 5.9.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.optimize import linprog, nnls
+
+from contactopt.problem.interface_problem import InterfaceProblem
+
+DIRECTIONS = 16  # of the polygon inside each cone, in 3D
+SURE = 1e-6  # work of the largest load over a motion's displacements from which on the motion counts
+SLACK = 1e-9  # by how much rounding may violate the cones, over the size of the motion at a contact
+BALANCED = 1e-10  # relative error of a balance that counts as exact
+FLAT = 1e-6  # share of the motion of the contacts below which they do not slide
+TURNING = 1e-3  # least displacement by a rotation, over the largest, of a body that tips over
+SECONDS = 5.0  # for the linear program
+
+
+@dataclass(frozen=True, eq=False)
+class Escape:
+    """A motion z (p,) that moves the loads forward and that no contact resists: the least one, of few bodies.
+
+    strongest  number of the multiplier that moves furthest, of the body on which the loads do most work; where it turns
+               without sliding, that of the rotation
+    opens      whether no contact slides in it
+    """
+
+    motion: np.ndarray
+    strongest: int
+    opens: bool
+
+
+def escape(problem: InterfaceProblem) -> Escape | None:
+    """A motion along which the loads drive the bodies away from all contacts; None if none is found.
+
+    Looked at are laws under which contacts can only push. Under laws whose friction is no cone, only motions count that do
+    not slide where there is friction.
+    """
+    if not problem.law.unilateral or not np.any(problem.s):
+        return None
+    s = problem.s / np.abs(problem.s).max()
+    if _balanced(problem, s):
+        return None
+    motion = _search(problem, sp.csr_array(problem.V), s)
+    if motion is None or not _passes(problem, s, motion):
+        return None
+    g = (problem.V @ motion).reshape(problem.q.shape)
+    opens = bool(np.abs(g[:, 1:]).max(initial=0.0) <= FLAT * np.abs(g).max(initial=0.0))
+    owners = [name.partition(":")[0] for name in problem.motions] or ["" for _ in s]
+    work = {owner: sum(s[i] * motion[i] for i, own in enumerate(owners) if own == owner) for owner in owners}
+    body = max(work, key=lambda owner: work[owner])
+    size = np.abs(motion) * np.array([owner == body for owner in owners])
+    turns = size * np.array(["rotation" in name for name in problem.motions] or np.zeros(len(s)))
+    if opens and turns.max() > TURNING * size.max():
+        size = turns
+    return Escape(motion, int(np.argmax(size)), opens)
+
+
+def _ways(dim: int) -> np.ndarray:
+    """Directions of slip (j, dim - 1), the corners of a polygon in 3D."""
+    if dim == 2:
+        return np.array([[1.0], [-1.0]])
+    angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def _balanced(problem: InterfaceProblem, s: np.ndarray) -> bool:
+    """Whether forces in polygons inside the cones are found that balance the loads, by nonnegative least squares."""
+    k, d = problem.q.shape
+    blocks = problem.V.reshape(k, d, -1)
+    edges = [blocks[:, 0] + problem.mu[:, None] * np.einsum("d,kdp->kp", way, blocks[:, 1:]) for way in _ways(d)]
+    A = np.concatenate(edges if np.any(problem.mu) else [blocks[:, 0]]).T
+    sizes = np.linalg.norm(A, axis=1)
+    if np.any(sizes == 0):
+        return False
+    try:
+        _, error = nnls(A / sizes[:, None], -s / sizes)
+    except RuntimeError:  # too many iterations
+        return False
+    return bool(error <= BALANCED * np.linalg.norm(s / sizes))
+
+
+def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.ndarray | None:
+    """min |z|_1 over motions with s' z = 1 and V z in a polygon inside each dual cone; None if there are none."""
+    k, d = problem.q.shape
+    normal = np.arange(k) * d
+    ways, factor = _ways(d), 1.0 if d == 2 else 1 / np.cos(np.pi / DIRECTIONS)
+    mu, fixed = problem.mu, ~_cones(problem)
+    smooth = (mu == 0) | fixed
+    rows = [-V[normal[smooth]]]
+    for way in ways:
+        slope = sum(c * V[normal + 1 + i] for i, c in enumerate(way))
+        rows.append((sp.diags_array(factor * mu) @ slope - V[normal])[~smooth])
+    A = sp.vstack(rows, format="csr")
+    still = [V[normal[fixed] + 1 + i] for i in range(d - 1)] if fixed.any() else []
+    equal = sp.vstack([sp.csr_array(s[None]), *still], format="csr")
+    answer = linprog(  # z = z+ - z-
+        np.ones(2 * len(s)),
+        sp.hstack([A, -A], format="csr"),
+        np.zeros(A.shape[0]),
+        sp.hstack([equal, -equal], format="csr"),
+        np.append(1.0, np.zeros(equal.shape[0] - 1)),
+        (0, 1 / SURE),
+        method="highs",
+        options={"time_limit": SECONDS},
+    )
+    return None if answer.x is None or answer.status != 0 else np.asarray(answer.x[: len(s)] - answer.x[len(s) :])
+
+
+def _cones(problem: InterfaceProblem) -> np.ndarray:
+    """(k,) contacts whose forces fill a cone, or are normal to the surface."""
+    return np.asarray(~problem.law.rough | (problem.mu > 0))
+
+
+def _passes(problem: InterfaceProblem, s: np.ndarray, motion: np.ndarray) -> bool:
+    """Whether the motion does work and meets the conditions of all contacts up to rounding."""
+    g = (problem.V @ motion).reshape(problem.q.shape)
+    size = np.abs(problem.V) @ np.abs(motion)
+    slide = np.linalg.norm(g[:, 1:], axis=1)
+    needed = np.where(_cones(problem), problem.mu * slide, np.where(slide > SLACK * size.max(), np.inf, 0.0))
+    work = s * motion
+    return bool(np.all(g[:, 0] - needed >= -SLACK * size.max()) and work.sum() > SURE * np.abs(work).sum())
+
+
+def sentence(problem: InterfaceProblem, found: Escape) -> str:
+    """What a motion without resistance means, for people."""
+    label = problem.motions[found.strongest] if problem.motions else f"column {found.strongest} of V"
+    body, _, motion = label.rpartition(": ")
+    body = body or "a body"
+    if motion.startswith("rotation"):
+        return f"the load is more than the contacts can hold: {body} tips over ({motion}); change the load or add a support."
+    if found.opens:
+        return f"the load pulls the bodies apart: no contact holds {body} ({motion}); press them together or add a support."
+    return (
+        f"the load is more than the contacts can hold: {body} slides off ({motion}); press the bodies together, or add "
+        "friction or a support."
+    )

@@ -1,0 +1,76 @@
+"""The pairs of surfaces of an interface problem, and one pair taken alone.
+
+Places on a contact surface mean something within one pair only. Whoever reads them (figures, half-widths, preconditioners)
+does so pair by pair.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contactopt.problem.chart import Chart
+from contactopt.problem.operators import block
+
+if TYPE_CHECKING:
+    from contactopt.problem.interface_problem import InterfaceProblem
+    from contactopt.problem.solution import Solution
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Consecutive contacts of an interface problem that belong to one pair of surfaces.
+
+    name          of the pair, for messages, tables and files
+    first, last   numbers of its first contact and of the first one after it
+    chart         places of its contacts on their surface
+    """
+
+    name: str
+    first: int
+    last: int
+    chart: Chart
+
+    @property
+    def contacts(self) -> slice:
+        """Of arrays with one row per contact."""
+        return slice(self.first, self.last)
+
+    def unknowns(self, dim: int) -> np.ndarray:
+        """Numbers of the pair's rows in Q."""
+        return np.arange(self.first * dim, self.last * dim)
+
+
+def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
+    """The contacts of one pair as a problem, without forces at all others. Where there is one pair only, the problem itself."""
+    if len(problem.pairs) == 1:
+        return problem
+    rows, own = pair.unknowns(problem.dim), pair.contacts
+    return replace(
+        problem,
+        Q=block(problem.Q, rows),
+        q=problem.q[own],
+        law=problem.law.select(np.arange(pair.first, pair.last)),
+        V=problem.V[rows],
+        areas=problem.areas[own],
+        coordinates=problem.coordinates[:, own],
+        chart=pair.chart,
+        pairs=(Pair(pair.name, 0, pair.last - pair.first, pair.chart),),
+    )
+
+
+def alone(problem: InterfaceProblem, solution: Solution, pair: Pair) -> tuple[InterfaceProblem, Solution]:
+    """The problem of one pair with the forces of all other pairs held at those of the solution, and its part of the solution.
+
+    The displacements of the pair are the same functions of its own forces, and the loads are those that the solution's
+    forces on the pair balance, so that a solution of the whole problem gives one of this problem. Where there is one pair
+    only, both are returned as they are.
+    """
+    if len(problem.pairs) == 1:
+        return problem, solution
+    part, r, lam = part_of(problem, pair), solution.reactions[pair.contacts], solution.multipliers
+    apart = problem.displacements(solution.reactions, lam)[pair.contacts] - part.displacements(r, lam)
+    held = replace(part, q=part.q + apart, s=-(part.V.T @ r.ravel()))
+    return held, replace(solution, reactions=r)

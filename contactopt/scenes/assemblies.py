@@ -1,0 +1,258 @@
+"""Bodies that others hold: a pin in a bush with clearance, a press fit, a stack of blocks, an arch of stones."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from contactopt.analytic import contact_modulus, pin_in_hole
+from contactopt.analytic import press_fit as lame
+from contactopt.checks import check_count, check_number, check_positive
+from contactopt.errors import InputError
+from contactopt.material import Material
+from contactopt.scenes.common import RUBBER, UNITS
+from contactopt.scenes.contact import Contact
+from contactopt.scenes.scene import BodyForce, Part, Rigid, Scene, Support
+
+STEEL = Material(E=210e3, nu=0.3)  # MPa
+STONE = Material(E=30e3, nu=0.2)
+LARGE = 30.0  # infinite plate: its outer radius over that of the hole
+THINNEST = 0.1075  # thickness over mean radius below which a half circle of stones cannot bear its own weight
+
+
+def pin_in_bush(
+    *,
+    radius: float = 20.0,
+    clearance: float = 0.5,
+    outside: float | None = None,
+    depth: float = 40.0,
+    material: Material = RUBBER,
+    mu: float = 0.0,
+    force: float = 100.0,
+    elements: int = 24,
+) -> Scene:
+    """A pin in the hole of a bush of the same material, pressed down by a force spread over it; plane strain.
+
+    Only contact holds the pin, whose radius is that of the hole less the clearance. The bush is clamped outside, at `outside`; by default that is 30 radii, which stand for an
+    infinite plate. Persson's solution is exact there without friction. The force acts as a force per volume: on the circle this has
+    the same radial displacements as a force at the centre but for a rigid motion.
+    Half model. Sizes in mm, force in N; elements across the contact half-width. The nodes divide the circles evenly.
+    """
+    check_positive(radius=radius, clearance=clearance, depth=depth, force=force)
+    check_count("elements", elements)
+    exact = pin_in_hole(force / depth, radius, clearance, contact_modulus(material, material))
+    edge = LARGE * radius if outside is None else outside
+    if not clearance < radius < edge:
+        raise InputError(f"the clearance must be less than the hole's radius {radius:g}, and the bush end beyond it.")
+
+    def sectors(elements: int) -> int:
+        return max(1, round(elements * np.pi * radius / (4 * exact.half_width)))
+
+    def pin(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
+        from contactopt.scenes.meshes import rename
+        from contactopt.scenes.polar import right_half_disc
+
+        return rename(right_half_disc(radius - clearance, sectors(elements)), contact="rim")
+
+    def bush(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
+        from contactopt.scenes.meshes import rename
+        from contactopt.scenes.polar import even, ring
+
+        parts = 4 * sectors(elements)
+        angles = np.linspace(-np.pi / 2, np.pi / 2, parts + 1)
+        return rename(ring(even(radius, edge, parts), angles), contact="inner")
+
+    parts = 8 * sectors(elements)  # the pin of linear elements is a polygon, and bears the force on its area
+    area = parts / 2 * np.sin(2 * np.pi / parts) * (radius - clearance) ** 2
+    weight = (0.0, -force / float(area * depth))
+    symmetry = Support("start", {"x": 0.0}), Support("end", {"x": 0.0})
+    return Scene(
+        "pin-in-bush",
+        Part(
+            "pin",
+            pin,
+            material,
+            (Support("axis", {"x": 0.0}),),
+            (BodyForce(weight),),
+            curve=_circle(radius - clearance),
+        ),
+        Part("bush", bush, material, (*symmetry, Support("outer")), curve=_circle(radius)),
+        mu,
+        thickness=depth,
+        copies=2,
+        elements=elements,
+        units=UNITS,
+        reference=exact if mu == 0 and outside is None else None,
+    )
+
+
+def press_fit(
+    kind: str = "plane-strain",
+    *,
+    radius: float = 20.0,
+    bore: float = 10.0,
+    outside: float = 40.0,
+    interference: float = 0.01,
+    depth: float = 40.0,
+    shaft: Material = STEEL,
+    hub: Material = STEEL,
+    mu: float = 0.15,
+    elements: int = 16,
+) -> Scene:
+    """A hollow shaft pressed into a hub whose hole is too narrow by `interference` on the radius.
+
+    kind  'plane-strain', a quarter of the section; or 'axisymmetric', a slice `depth` high between two frictionless
+          planes. Lame's pressure is exact in both as the interference goes to zero.
+    The shaft is larger than `radius` by half of the interference, the hole smaller by the other half.
+    Sizes in mm; elements along the quarter of the circle, or along the height.
+    """
+    exact = lame(interference, bore, radius, outside, shaft, hub)
+    check_positive(bore=bore, depth=depth)
+    check_count("elements", elements)
+    if kind not in ("plane-strain", "axisymmetric"):
+        raise InputError(f"kind must be 'plane-strain' or 'axisymmetric'; got {kind!r}.")
+    limits = {"shaft": (bore, radius + interference / 2), "hub": (radius - interference / 2, outside)}
+    side = {"shaft": "outer", "hub": "inner"}
+
+    def mesh(body: str, elements: int):  # type: ignore[no-untyped-def]
+        from contactopt.scenes.meshes import rename, tensor_mesh
+        from contactopt.scenes.polar import even, ring
+
+        if kind == "plane-strain":
+            made = ring(even(*limits[body], 2 * elements), np.linspace(0, np.pi / 2, elements + 1))
+            return rename(made, contact=side[body])
+        across = max(1, round((limits[body][1] - limits[body][0]) * elements / depth))
+        made = tensor_mesh(np.linspace(*limits[body], across + 1), np.linspace(0, depth, elements + 1))
+        return rename(made, start="y-", end="y+", contact={"outer": "x+", "inner": "x-"}[side[body]])
+
+    normal = {"plane-strain": ("y", "x"), "axisymmetric": ("z", "z")}[kind]
+    ends = tuple(Support(name, {component: 0.0}) for name, component in zip(("start", "end"), normal))
+    curves = {name: _circle(limits[name][name == "shaft"]) if kind == "plane-strain" else None for name in limits}
+
+    def part(name: str, material: Material) -> Part:
+        return Part(name, lambda elements, zone: mesh(name, elements), material, ends, curve=curves[name])
+
+    return Scene(
+        "press-fit",
+        part("shaft", shaft),
+        part("hub", hub),
+        mu,
+        kind=kind,
+        thickness=depth if kind == "plane-strain" else 1.0,
+        copies=4 if kind == "plane-strain" else 1,
+        elements=elements,
+        units=UNITS,
+        reference=exact,
+    )
+
+
+def stack(
+    *,
+    blocks: int = 4,
+    width: float = 200.0,
+    height: float = 100.0,
+    depth: float = 100.0,
+    material: Material = STONE,
+    mu: float = 0.6,
+    weight: float = 100.0,
+    tilt: float = 10.0,
+    elements: int = 8,
+) -> Scene:
+    """Blocks that only rest on each other, the lowest on a rigid floor, all tilted by an angle [degrees]; plane strain.
+
+    Statics give the resultant of every joint: with W the weight above it, W cos(tilt) across and W sin(tilt) along, through
+    the centre of gravity of what is above. The stack stands as long as tan(tilt) is below mu and below
+    width / (height of the stack). `weight` is that of one block.
+    Sizes in mm, weight in N; elements across half the width.
+    """
+    check_count("blocks", blocks)
+    check_count("elements", elements)
+    check_positive(width=width, height=height, depth=depth, weight=weight)
+    check_number("tilt", tilt, low=-90.0, high=90.0)
+    slope = np.tan(np.radians(tilt))
+    if abs(slope) >= min(mu, width / (blocks * height)):
+        raise InputError(
+            f"tilted by {tilt:g} degrees the stack slides or falls over; take a tilt below "
+            f"{np.degrees(np.arctan(min(mu, width / (blocks * height)))):.3g} degrees, or more friction, or fewer blocks."
+        )
+    density = weight / (width * height * depth)
+    load = BodyForce((density * float(np.sin(np.radians(tilt))), -density * float(np.cos(np.radians(tilt)))))
+
+    def mesh(level: int):  # type: ignore[no-untyped-def]
+        def build(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
+            from contactopt.scenes.meshes import rename, tensor_mesh
+
+            rows = max(1, round(2 * elements * height / width))
+            x, y = np.linspace(-width / 2, width / 2, 2 * elements + 1), np.linspace(0, height, rows + 1)
+            return rename(tensor_mesh(x, y + level * height), contact="y-", top="y+")
+
+        return build
+
+    names = [f"block-{i + 1}" for i in range(blocks)]
+    below = ["floor", *(f"{name}:top" for name in names)]
+    return Scene(
+        "stack",
+        bodies=(Rigid("floor"), *(Part(name, mesh(i), material, loads=(load,)) for i, name in enumerate(names))),
+        contacts=tuple(Contact(upper, lower, mu) for upper, lower in zip(names, below)),
+        thickness=depth,
+        elements=elements,
+        units=UNITS,
+    )
+
+
+def arch(
+    *,
+    stones: int = 7,
+    radius: float = 1000.0,
+    thickness: float = 250.0,
+    depth: float = 500.0,
+    material: Material = STONE,
+    mu: float = 0.6,
+    weight: float = 1000.0,
+    elements: int = 8,
+) -> Scene:
+    """A half circle of stones that only rest on each other, the outermost on rigid ground; plane strain.
+
+    Every springing bears half of the weight; the thrusts at both balance. Stones of a thickness below .1075 of the mean
+    radius cannot stand at all (Milankovitch 1907, Theorie der Druckkurven, Z. Math. Phys. 55, 1-27). `weight` is that of all stones.
+    Sizes in mm, weight in N; elements across half the thickness.
+    """
+    check_count("stones", stones)
+    check_count("elements", elements)
+    check_positive(radius=radius, thickness=thickness, depth=depth, weight=weight)
+    if not THINNEST < thickness / radius < 2:
+        raise InputError(
+            f"the thickness over the mean radius is {thickness / radius:.4g}; such an arch cannot stand: take more than "
+            f"{THINNEST:g}, and less than 2."
+        )
+    load = BodyForce((0.0, -weight / (np.pi * radius * thickness * depth)))
+
+    def mesh(number: int):  # type: ignore[no-untyped-def]
+        def build(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
+            from contactopt.scenes.polar import ring
+
+            rows = max(1, round(2 * elements * np.pi * radius / stones / thickness))
+            angles = np.linspace(number * np.pi / stones, (number + 1) * np.pi / stones, rows + 1)
+            return ring(np.linspace(radius - thickness / 2, radius + thickness / 2, 2 * elements + 1), angles)
+
+        return build
+
+    names = [f"stone-{i + 1}" for i in range(stones)]
+    bodies = [Part(name, mesh(i), material, loads=(load,), contact="start") for i, name in enumerate(names)]
+    joints = [Contact(names[0], "right", mu)]
+    joints += [Contact(upper, f"{lower}:end", mu) for lower, upper in pairwise(names)]
+    joints += [Contact(f"{names[-1]}:end", "left", mu)]
+    return Scene(
+        "arch",
+        bodies=(Rigid("right"), Rigid("left"), *bodies),
+        contacts=tuple(joints),
+        thickness=depth,
+        elements=elements,
+        units=UNITS,
+    )
+
+
+def _circle(radius: float):  # type: ignore[no-untyped-def]
+    """The curve of a contact boundary on a circle around the origin."""
+    return lambda x: radius * x / np.linalg.norm(x, axis=0)

@@ -1,0 +1,143 @@
+"""The mesh of a body in a scene file: from a mesh file, or a block, a ring or a disc."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.scenes.toml_table import Table
+
+# names of units of length -> metres
+LENGTHS = {"nm": 1e-9, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
+SHAPES = ("mesh", "block", "ring", "disc")
+FAR = 1e6  # distance from the origin over the size of a body, beyond which rounding deforms its elements
+MOST = 2_000_000  # elements of a structured body
+
+
+def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], length: str) -> Any:
+    """The mesh that a body's table describes, moved to its place, with its boundaries; None without a folder: entries are only known."""
+    group, move, places = body.text("group"), body.table("move"), body.table("boundaries")
+    unit, shapes = body.text("unit"), [shape for shape in SHAPES if body.has(shape)]
+    body.known.append("rigid")
+    if folder is None:
+        return None
+    if len(shapes) != 1:
+        raise body.fail(
+            f"a body needs exactly one of mesh, block, ring, disc and rigid; this one has {' and '.join(shapes) or 'none'}."
+        )
+    if shapes[0] == "mesh":
+        mesh = _from_file(body, folder, group, _scale(body, unit, length))
+    elif group or unit:
+        raise body.fail("'group' and 'unit' belong to a mesh file.", "group" if group else "unit")
+    else:
+        shape = body.table(shapes[0])
+        assert shape is not None
+        if shapes[0] != "block" and len(components) != 2:
+            raise shape.fail(f"a {shapes[0]} is plane; in space use a block or a mesh file.")
+        mesh = {"block": _block, "ring": _ring, "disc": _disc}[shapes[0]](shape, components)
+        shape.close()
+    if move is not None:
+        step = [move.number(c, 0.0) for c in components]
+        move.close()
+        mesh = replace(mesh, doflocs=mesh.doflocs + np.array(step)[:, None])
+        if np.abs(mesh.doflocs).max() > FAR * np.ptp(mesh.doflocs, axis=1).min():
+            raise body.fail("the body is moved so far that rounding deforms it; keep it nearer to the origin.", "move")
+    return mesh if places is None else _named(mesh, places, components)
+
+
+def _scale(body: Table, unit: str | None, length: str) -> float:
+    """The unit of the file in that of the scene."""
+    if unit is None:
+        return 1.0
+    for name, where in ((unit, "this body"), (length, "the scene (units = { length = ..., stress = ... })")):
+        if name not in LENGTHS:
+            raise body.fail(
+                f"the unit of length of {where} is {name!r}; to convert it, it must be one of {', '.join(LENGTHS)}.",
+                "unit",
+            )
+    return LENGTHS[unit] / LENGTHS[length]
+
+
+def _from_file(body: Table, folder: Path, group: str | None, scale: float) -> Any:
+    from contactopt.scenes.mesh_files import load_mesh
+
+    name = body.text("mesh")
+    with body.about("group" if group else "mesh"):
+        return load_mesh(folder / name, group, scale)
+
+
+def _grid(table: Table, key: str, what: str) -> tuple[float, float]:
+    low, high = table.numbers(key, 2, what)
+    if low >= high:
+        raise table.fail(f"{key!r} must ascend; got {low:g} to {high:g}.", key)
+    return low, high
+
+
+def _counts(table: Table, names: tuple[str, ...]) -> list[int]:
+    counts = table.numbers("elements", len(names), f"the numbers of elements [{', '.join(names)}]")
+    if not all(isinstance(count, int) and count >= 1 for count in counts) or np.prod(counts, dtype=float) > MOST:
+        raise table.fail(f"'elements' must be whole numbers of at least 1, at most {MOST} elements in all.", "elements")
+    return [int(count) for count in counts]
+
+
+def _block(table: Table, components: tuple[str, ...]) -> Any:
+    from contactopt.scenes.meshes import rename, tensor_mesh
+
+    sides = [_grid(table, c, f"two coordinates, [least {c}, largest {c}]") for c in components]
+    counts = _counts(table, tuple(f"along {c}" for c in components))
+    mesh = tensor_mesh(*(np.linspace(*side, count + 1) for side, count in zip(sides, counts)))
+    own = {f"{new}{sign}": f"{old}{sign}" for new, old in zip(components, "xyz") for sign in "-+"}
+    boundaries = {new: mesh.boundaries[old] for new, old in own.items()}
+    return replace(mesh, _boundaries=boundaries) if boundaries.keys() != mesh.boundaries.keys() else rename(mesh)
+
+
+def _ring(table: Table, components: tuple[str, ...]) -> Any:
+    from contactopt.scenes.polar import ring
+
+    radii = _grid(table, "radii", "two radii, [inner, outer]")
+    first, last = (
+        _grid(table, "angles", "two angles in degrees, [first, last]") if table.has("angles") else (0.0, 360.0)
+    )
+    if radii[0] <= 0 or last - first > 360:
+        raise table.fail("the inner radius must be positive, and the angles at most 360 degrees apart.")
+    across, around = _counts(table, ("across", "around"))
+    if last - first == 360 and around < 3:
+        raise table.fail("a whole ring needs at least 3 elements around.", "elements")
+    return ring(np.linspace(*radii, across + 1), np.radians(np.linspace(first, last, around + 1)))
+
+
+def _disc(table: Table, components: tuple[str, ...]) -> Any:
+    from contactopt.scenes.polar import disc
+
+    radius = table.number("radius", needed=True, low=0.0)
+    (around,) = (
+        _counts(table, ("around",))
+        if isinstance(table.data.get("elements"), list)
+        else [table.take("elements", int, "a whole number", needed=True)]
+    )
+    if around < 8 or around % 8 or around > 10_000:
+        raise table.fail("'elements' around a disc must be a multiple of 8, at most 10000.", "elements")
+    return disc(radius, around // 8)
+
+
+def _named(mesh: Any, places: Table, components: tuple[str, ...]) -> Any:
+    """The mesh with the boundaries that are named by where they are."""
+    from contactopt.scenes.mesh_files import name_boundaries
+
+    for name in places.data:
+        place = places.table(name)
+        assert place is not None
+        limits = {}
+        for axis, c in enumerate(components):
+            if isinstance(place.data.get(c), list):
+                limits[axis] = _grid(place, c, f"one {c}, or two, [least, largest]")
+            elif place.has(c):
+                value = place.number(c)
+                limits[axis] = (value, value)
+        place.close()
+        with place.about():
+            mesh = name_boundaries(mesh, {name: limits})
+    return mesh

@@ -1,0 +1,81 @@
+"""Which surfaces of which bodies may touch, and under which law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contactopt.checks import check_number, real_array
+from contactopt.errors import InputError
+from contactopt.problem.laws import find_law
+
+SIDES = ("upper", "lower")
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A pair of surfaces that may touch: `upper` is pressed on `lower`.
+
+    The contact normal is the outward normal of the lower surface; a positive normal reaction pushes the upper body away
+    from it. A surface may belong to several pairs. A node in two pairs has two contacts, one in each.
+
+    upper, lower  a body's name, or 'name:surface' for another surface than the contact boundary of its Part
+    mu            what the law reads: the friction coefficient, for 'tresca' a bound of the tangential traction [stress]; a
+                  number >= 0, one per contact (k,), or a function of the contacts' positions (dim, k) that gives either
+    law           a name in contactopt.problem.laws.LAWS
+    coupling      a name in contactopt.interface.coupling.COUPLINGS, or 'auto' for the one that fits the surfaces
+    carrier       the side whose nodes carry the contacts, 'upper' or 'lower', for couplings that can choose; None: the
+                  coupling chooses
+    """
+
+    upper: str
+    lower: str
+    mu: float | np.ndarray | Callable[[np.ndarray], Any]
+    law: str = "coulomb"
+    coupling: str = "auto"
+    carrier: str | None = None
+
+    def __post_init__(self) -> None:
+        for side in (self.upper, self.lower):
+            if not isinstance(side, str):
+                raise InputError(f"a contact names its bodies by text, 'body' or 'body:surface'; got {side!r}.")
+        if self.bodies[0] == self.bodies[1]:
+            raise InputError(f"a contact joins two bodies; '{self.bodies[0]}' cannot touch itself.")
+        if self.carrier not in (None, *SIDES):
+            raise InputError(f"the carrier of contact '{self.name}' must be 'upper', 'lower' or None.")
+        find_law(self.law)
+        if not callable(self.mu):
+            check_friction(self.mu)
+
+    @property
+    def bodies(self) -> tuple[str, str]:
+        """Names of the upper and the lower body."""
+        return self.upper.partition(":")[0], self.lower.partition(":")[0]
+
+    @property
+    def surfaces(self) -> tuple[str | None, str | None]:
+        """Names of the surfaces of the upper and the lower body; None for the contact boundary of the Part."""
+        return self.upper.partition(":")[2] or None, self.lower.partition(":")[2] or None
+
+    @property
+    def name(self) -> str:
+        """'upper-lower', with a dot before the name of a surface: fit for the name of a file."""
+        return f"{self.upper}-{self.lower}".replace(":", ".")
+
+    @property
+    def friction(self) -> str:
+        """The law and its number, for titles: 'mu = 0.3'."""
+        name = "mu" if self.law in ("coulomb", "bilateral") else f"{self.law}, mu"
+        return f"{name} = {self.mu:g}" if isinstance(self.mu, (int, float)) else f"{name} varies"
+
+
+def check_friction(mu: Any) -> None:
+    """Raise InputError unless mu is a number, or an array of numbers, that are not negative."""
+    name = "the friction coefficient mu"
+    if np.ndim(mu) == 0:
+        check_number(name, mu, low=0.0, closed=True)
+    elif np.any(real_array(name, mu) < 0):
+        raise InputError(f"{name} must not be negative; its least value is {np.min(mu):g}.")

@@ -1,0 +1,194 @@
+"""Faults of meshes from files: each is repaired, with a line in the log, or refused in a sentence that names the element."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import skfem
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from contactopt.errors import InputError
+
+SAME = 1e-6  # nodes this fraction of the smaller element apart are one node
+FLAT = 1e-10  # an element of less volume, over that of a cube of its size, is degenerate
+CLOSED = 1e-9  # what the normals of a closed surface may sum up to, over its area
+CORNERS = {
+    **{"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4, "tetra": 4, "tetra10": 4},
+    **{"hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8},
+}
+# places in an element of the same element numbered the other way round; the order of nodes is that of meshio
+_HEXAHEDRON = (4, 5, 6, 7, 0, 1, 2, 3)
+MIRRORED = {
+    "triangle": (0, 2, 1),
+    "triangle6": (0, 2, 1, 5, 4, 3),
+    "quad": (0, 3, 2, 1),
+    "quad9": (0, 3, 2, 1, 7, 6, 5, 4, 8),
+    "tetra": (0, 2, 1, 3),
+    "tetra10": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8),
+    "hexahedron": _HEXAHEDRON,
+    "hexahedron27": (*_HEXAHEDRON, 12, 13, 14, 15, 8, 9, 10, 11, 16, 17, 18, 19, 20, 21, 22, 23, 25, 24, 26),
+}
+# the sides of serendipity elements that have no node in the middle: their corners and the nodes of their edges
+_SIDES = {
+    "quad8": (((0, 1, 2, 3), (4, 5, 6, 7)),),
+    "hexahedron20": (
+        ((0, 3, 4, 7), (11, 15, 16, 19)),
+        ((1, 2, 5, 6), (9, 13, 17, 18)),
+        ((0, 1, 4, 5), (8, 12, 16, 17)),
+        ((2, 3, 6, 7), (10, 14, 18, 19)),
+        ((0, 1, 2, 3), (8, 9, 10, 11)),
+        ((4, 5, 6, 7), (12, 13, 14, 15)),
+    ),
+}
+COMPLETE = {"quad8": "quad9", "hexahedron20": "hexahedron27"}
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Elements of one type and their nodes.
+
+    path     of the file
+    kind     type of the elements in meshio
+    points   (dim, n) places of the nodes
+    nodes    (v, e) nodes of every element, the corners first
+    numbers  (e,) where it stands among the elements of its type in the file, from 0
+    """
+
+    path: Path
+    kind: str
+    points: np.ndarray
+    nodes: np.ndarray
+    numbers: np.ndarray
+
+    @property
+    def corners(self) -> np.ndarray:
+        return self.nodes[: CORNERS[self.kind]]
+
+    def name(self, element: int) -> str:
+        """What a message calls an element: its type, number and place."""
+        middle = self.points[:, self.corners[:, element]].mean(axis=1)
+        return f"{self.kind} number {self.numbers[element] + 1} of the file, at ({text(middle)})"
+
+
+def text(x: np.ndarray) -> str:
+    return ", ".join(f"{value:.6g}" for value in x)
+
+
+def complete(cells: Cells) -> Cells:
+    """Serendipity elements with the nodes that they lack, at the places that their own shape functions give."""
+    if cells.kind not in COMPLETE:
+        return cells
+    c = cells.points[:, cells.nodes]
+    new = [c[:, list(b)].sum(axis=1) / 2 - c[:, list(a)].sum(axis=1) / 4 for a, b in _SIDES[cells.kind]]
+    if cells.kind == "hexahedron20":
+        new.append(c[:, 8:].sum(axis=1) / 4 - c[:, :8].sum(axis=1) / 4)
+    extra = cells.points.shape[1] + np.arange(len(new) * c.shape[2]).reshape(len(new), -1)
+    points, nodes = np.concatenate([cells.points, *new], axis=1), np.concatenate([cells.nodes, extra])
+    made = replace(cells, kind=COMPLETE[cells.kind], points=points, nodes=nodes)
+    return replace(made, nodes=representatives(made, repair=False)[nodes])  # neighbours share the middle of their side
+
+
+def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
+    """For every node the one that stands for it and for all others at its place."""
+    own = np.arange(cells.points.shape[1])
+    used = np.unique(cells.nodes)
+    size = np.linalg.norm(np.ptp(cells.points[:, cells.corners], axis=1), axis=0)
+    smallest = np.full(len(own), np.inf)
+    for row in cells.nodes:
+        np.minimum.at(smallest, row, size)
+    pairs = used[KDTree(cells.points[:, used].T).query_pairs(SAME * size.max(), output_type="ndarray")]
+    apart = np.linalg.norm(cells.points[:, pairs[:, 0]] - cells.points[:, pairs[:, 1]], axis=0)
+    pairs = pairs[apart <= SAME * smallest[pairs].min(axis=1)]
+    if not len(pairs):
+        return own
+    if repair:
+        log.warning("%s: nodes that lie on others are merged with them, the first at (%s); %d pairs",
+                    cells.path, text(cells.points[:, pairs[0, 0]]), len(pairs))  # fmt: skip
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T), (len(own), len(own)))
+    label = connected_components(graph, directed=False)[1]
+    first = np.full(label.max() + 1, len(own))
+    np.minimum.at(first, label, own)
+    return np.asarray(first[label])
+
+
+def repaired(cells: Cells, merged: np.ndarray) -> Cells:
+    """The elements on the merged nodes, each once, with their corners numbered the right way round."""
+    sets = np.sort(merged[cells.corners], axis=0)
+    flat = np.flatnonzero(np.any(np.diff(sets, axis=0) == 0, axis=0))
+    if len(flat):
+        raise InputError(
+            f"mesh file '{cells.path}': two corners coincide in {cells.name(flat[0])}; mesh this place anew."
+        )
+    once = np.sort(np.unique(sets, axis=1, return_index=True)[1])
+    if len(once) < sets.shape[1]:
+        log.warning("%s: %d elements are there twice and are dropped", cells.path, sets.shape[1] - len(once))
+    cells = replace(cells, nodes=merged[cells.nodes[:, once]], numbers=cells.numbers[once])
+    wrong = _volumes(cells.points, cells.corners) < 0
+    if wrong.any():
+        log.warning(
+            "%s: %d elements number their corners the wrong way round and are turned, the first is %s",
+            cells.path, wrong.sum(), cells.name(int(np.argmax(wrong))),
+        )  # fmt: skip
+        nodes = cells.nodes.copy()
+        nodes[:, wrong] = nodes[list(MIRRORED[cells.kind])][:, wrong]
+        cells = replace(cells, nodes=nodes)
+    return cells
+
+
+def pieces(cells: Cells) -> int:
+    """Into how many pieces the elements fall that share no node."""
+    first = np.broadcast_to(cells.corners[0], cells.corners.shape)
+    size = cells.points.shape[1]
+    graph = coo_matrix((np.ones(first.size), (first.ravel(), cells.corners.ravel())), (size, size))
+    label = connected_components(graph, directed=False)[1]
+    return len(np.unique(label[cells.corners[0]]))
+
+
+def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
+    """Raise InputError unless all elements have volume and nowhere fold over, and no facet belongs to more than two."""
+    places = np.asarray(mesh.elem().doflocs).T
+    places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
+    volume = np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1))
+    size = np.linalg.norm(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** len(mesh.p)
+    bad = np.flatnonzero((volume * np.sign(volume[:, -1:])).min(axis=1) <= FLAT * size)
+    if len(bad):
+        how = "has no volume" if np.abs(volume[bad[0]]).max() <= FLAT * size[bad[0]] else "folds over"
+        raise InputError(f"mesh file '{cells.path}': {cells.name(bad[0])} {how}; mesh this place anew.")
+    shared = np.bincount(mesh.t2f.ravel())
+    if shared.max() > 2:
+        element = int(np.argmax(np.any(mesh.t2f == np.argmax(shared), axis=0)))
+        raise InputError(
+            f"mesh file '{cells.path}': more than two elements share a facet, one of them is {cells.name(element)}; "
+            "elements must not overlap."
+        )
+
+
+def check_surface(path: Path, mesh: skfem.Mesh) -> None:
+    """Raise InputError unless the outward normals of the surface integrate to zero, as those of a closed surface do."""
+    surface = skfem.FacetBasis(mesh, mesh.elem(), facets=mesh.boundary_facets())
+    total = np.abs((np.asarray(surface.normals) * surface.dx).sum(axis=(1, 2))).max()
+    if total > CLOSED * surface.dx.sum():
+        raise InputError(
+            f"mesh file '{path}': the surface of the body is not closed, its normals sum up to {total:.3g}; elements overlap."
+        )
+
+
+def _volumes(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Signed volume (up to a factor) of each element, from the mean directions along its axes."""
+    c = points[:, corners]
+    simplex = len(corners) == len(points) + 1
+    if simplex:
+        axes = [c[:, i] - c[:, 0] for i in range(1, len(corners))]
+    else:
+        ends: list[tuple[tuple[int, ...], tuple[int, ...]]] = [((1, 2), (0, 3)), ((2, 3), (0, 1))]
+        if len(points) == 3:
+            ends = [((1, 2, 5, 6), (0, 3, 4, 7)), ((2, 3, 6, 7), (0, 1, 4, 5)), ((4, 5, 6, 7), (0, 1, 2, 3))]
+        axes = [c[:, list(b)].sum(axis=1) - c[:, list(a)].sum(axis=1) for b, a in ends]
+    return np.asarray(np.linalg.det(np.stack(axes).transpose(2, 0, 1)))

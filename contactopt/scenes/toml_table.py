@@ -1,0 +1,213 @@
+"""Tables of a TOML file that know where they stand, so that every message about them names the line."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from contactopt.checks import check_number, short
+from contactopt.errors import InputError
+
+LARGEST = 1_000_000  # bytes of a file that people write
+TOKEN = re.compile(
+    r"""(?P<space>[ \t\r\n]+|\#[^\n]*)
+    |(?P<text>\"{3}(?:\\[\s\S]|(?!\"{3})[^\\])*\"{3,5}|'{3}(?:(?!'{3})[\s\S])*'{3,5}|"(?:\\.|[^"\\\n])*"|'[^'\n]*')
+    |(?P<mark>[\[\]{}=,])|(?P<bare>[^\s\#"'\[\]{}=,]+)""",
+    re.VERBOSE,
+)
+Place = tuple[str | int, ...]
+
+
+class Table:
+    """A table of the file. Each entry is taken once, by name and type; close() then refuses those that are left.
+
+    file   name of the file, for messages
+    lines  place of every entry -> line
+    """
+
+    def __init__(self, file: str, lines: dict[Place, int], data: dict[str, Any], place: Place = ()):
+        self.file, self.lines, self.data, self.place = file, lines, data, place
+        self.known: list[str] = []
+
+    def fail(self, message: str, *below: str | int) -> InputError:
+        """The error to raise about this table, or about an entry of it."""
+        place: Place = (*self.place, *below)
+        while place and place not in self.lines:
+            place = place[:-1]
+        line = f", line {self.lines[place]}" if place else ""
+        return InputError(f"{self.file}{line}: {message}")
+
+    @contextmanager
+    def about(self, *below: str | int) -> Iterator[None]:
+        """Errors raised in this block are about this table, or about an entry of it."""
+        try:
+            yield
+        except InputError as error:
+            if str(error).startswith(f"{self.file}, line"):
+                raise
+            raise self.fail(str(error), *below) from error
+
+    def has(self, key: str) -> bool:
+        self.known.append(key)
+        return key in self.data
+
+    def take(
+        self, key: str, kind: type | tuple[type, ...], what: str, default: Any = None, needed: bool = False
+    ) -> Any:
+        """The entry, which must be of that type; `what` names the type in a message."""
+        if not self.has(key):
+            if needed:
+                raise self.fail(f"{key!r} is missing{self._here()}; it is {what}.")
+            return default
+        value = self.data[key]
+        if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
+            raise self.fail(f"{key!r} must be {what}; got {short(value)}.", key)
+        return value
+
+    def text(self, key: str, default: str | None = None, needed: bool = False) -> Any:
+        return self.take(key, str, "a text in quotation marks", default, needed)
+
+    def number(self, key: str, default: float | None = None, needed: bool = False, **limits: Any) -> Any:
+        """A finite number within the limits of check_number()."""
+        value = self.take(key, (int, float), "a number", default, needed)
+        if key in self.data:
+            with self.about(key):
+                check_number(key, value, **limits)
+        return value
+
+    def numbers(self, key: str, count: int | None, what: str) -> list[float]:
+        """An array of `count` finite numbers, which must be there."""
+        values = self.take(key, list, what, needed=True)
+        if count is not None and len(values) != count:
+            raise self.fail(f"{key!r} must be {what}; got {len(values)} values.", key)
+        for i, value in enumerate(values):
+            with self.about(key, i):
+                check_number(f"every value of {key}", value)
+        return values
+
+    def table(self, key: str) -> Table | None:
+        """The table below an entry, None if there is none."""
+        data = self.take(key, dict, "a table, { name = value, ... }")
+        return None if data is None else Table(self.file, self.lines, data, (*self.place, key))
+
+    def tables(self, key: str) -> list[Table]:
+        """The tables of an array, none if it is not there."""
+        found = self.take(key, list, "an array of tables, [{ name = value, ... }, ...]", [])
+        for i, data in enumerate(found):
+            if not isinstance(data, dict):
+                raise self.fail(
+                    f"every entry of {key!r} must be a table, {{ name = value, ... }}; got {short(data)}.", key, i
+                )
+        return [Table(self.file, self.lines, data, (*self.place, key, i)) for i, data in enumerate(found)]
+
+    def close(self) -> None:
+        """Refuse entries that nothing has asked for."""
+        for key in self.data:
+            if key not in self.known:
+                valid = ", ".join(dict.fromkeys(self.known))
+                raise self.fail(f"there is no {key!r}{self._here()}; valid names are {valid}.", key)
+
+    def _here(self) -> str:
+        names = [str(part) if isinstance(part, str) else f"[{part + 1}]" for part in self.place]
+        return " in " + ".".join(names).replace(".[", "[") if names else ""
+
+
+def read_table(path: Path) -> Table:
+    """The whole of a TOML file; InputError with the line where it is not TOML."""
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "is no file that can be read" if path.exists() else "does not exist"
+        raise InputError(f"scene file '{path}' {what}.")
+    if path.stat().st_size > LARGEST:
+        raise InputError(f"scene file '{path}' has more than {LARGEST} bytes; meshes belong into files of their own.")
+    try:
+        text = path.read_bytes().decode().replace("\r\n", "\n")
+        return Table(path.name, lines_of(text) if tomllib.loads(text) else {}, tomllib.loads(text))
+    except UnicodeDecodeError as error:
+        raise InputError(f"scene file '{path}' is no text in UTF-8.") from error
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r" \(at line (\d+), column \d+\)", str(error))
+        line = int(found[1]) if found else text.count("\n") + 1
+        said = re.sub(r" \(at .*\)", "", str(error))
+        raise InputError(f"{path.name}, line {line}: {said[:1].lower()}{said[1:]}.") from error
+    except (RecursionError, OSError) as error:
+        raise InputError(f"scene file '{path}' cannot be read: {type(error).__name__}.") from error
+
+
+def lines_of(text: str) -> dict[Place, int]:
+    """Place of every entry of a valid TOML text -> its line, from 1."""
+    tokens, line = [], 1
+    for match in TOKEN.finditer(text):
+        if match.lastgroup != "space":
+            tokens.append((match.group(), match.lastgroup, line))
+        line += match.group().count("\n")
+    return _Lines(tokens).read()
+
+
+class _Lines:
+    """One walk over the tokens of a TOML text."""
+
+    def __init__(self, tokens: list[tuple[str, str | None, int]]):
+        self.tokens, self.at = tokens, 0
+        self.found: dict[Place, int] = {}
+
+    def read(self) -> dict[Place, int]:
+        prefix: Place = ()
+        counts: dict[Place, int] = {}
+        while self.at < len(self.tokens):
+            if self.tokens[self.at][0] != "[":
+                self._entry(prefix)
+                continue
+            line, array = self.tokens[self.at][2], self.tokens[self.at + 1][0] == "["
+            self.at += 1 + array
+            *parents, name = self._key()
+            self.at += 1 + array
+            prefix = ()
+            for part in parents:
+                prefix = (*prefix, part)
+                prefix = (*prefix, counts[prefix] - 1) if prefix in counts else prefix
+            prefix = (*prefix, name)
+            if array:
+                counts[prefix] = counts.get(prefix, 0) + 1
+                self.found.setdefault(prefix, line)
+                prefix = (*prefix, counts[prefix] - 1)
+            self.found.setdefault(prefix, line)
+        return self.found
+
+    def _key(self) -> list[str]:
+        parts: list[str] = []
+        while self.tokens[self.at][1] != "mark":
+            token, kind, _ = self.tokens[self.at]
+            parts += (
+                [tomllib.loads(f"x = {token}")["x"]] if kind == "text" else [part for part in token.split(".") if part]
+            )
+            self.at += 1
+        return parts
+
+    def _entry(self, prefix: Place) -> None:
+        line = self.tokens[self.at][2]
+        for part in self._key():
+            prefix = (*prefix, part)
+            self.found.setdefault(prefix, line)
+        self.at += 1  # the equals sign
+        self._value(prefix)
+
+    def _value(self, place: Place) -> None:
+        token, kind, line = self.tokens[self.at]
+        self.found.setdefault(place, line)
+        self.at += 1
+        if kind != "mark":
+            return
+        count = 0
+        while self.tokens[self.at][0] not in "]}":
+            if self.tokens[self.at][0] == ",":
+                self.at += 1
+            elif token == "{":
+                self._entry(place)
+            else:
+                self._value((*place, count))
+                count += 1
+        self.at += 1

@@ -1,0 +1,175 @@
+"""An interior-point method for Coulomb friction, on a symmetric or unsymmetric Q, sparse or an array.
+
+With the cones K of forces and K* dual to them, De Saxce's form of Coulomb's law is
+    r in K,   z = u + mu |u_t| n in K*,   r' z = 0  at each contact,   u = Q r + V lambda + q,   V' r + s = 0.
+In x = (mu r_n, r_t) and (z_n / mu, z_t) both cones are Lorentz's. Each iteration is one Newton step on z = u + mu |u_t| n
+with |u_t| linearised (where that led to a short step: as it is), the balance, and x o z = sigma (x'z / k) e in the scaling of Nesterov and Todd, predictor and
+corrector from one factorisation of Q + blocks, whose pattern is that of Q. It tells open, sticking and slipping contacts
+apart in few iterations where Newton's method cycles, and the null space of Q does not disturb it; the last digits are
+left to Newton's method. For Coulomb's law it is a method without a proof of convergence; it ends when it makes no
+progress.
+Source: Acary, Armand, Nguyen, Shpakovych (2024), Second-order cone programming for frictional contact mechanics using
+interior point algorithm; Nesterov, Todd (1997); Mehrotra (1992) for the corrector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.cones import coulomb_cone
+from contactopt.solving.kernels.sparse_blocks import Blocks, Solver, bordered
+
+SMOOTH, ROUGH = 1e-4, 1e3  # friction coefficients below and above which they count as none and as this
+ITERATIONS = 60
+NEAR = 1e-9  # complementarity and residual at which it ends
+CENTRAL = 1e-3  # least eigenvalue of x o z at a contact, over the mean
+BOUNDARY, SHORT = 0.98, 0.9  # of the way to the boundary of the cones
+STALLED = 12  # iterations without progress
+RIDGE = 1e-10
+START = 100.0  # size of the first point in both cones, over dimensionless forces of order one
+STUCK = 0.3  # a step shorter than this is no Newton step; the next one leaves |u_t| as it is
+
+Iterate = tuple[np.ndarray, np.ndarray]
+
+
+def interior_iterates(problem: InterfaceProblem, matrix: Blocks, full: bool = False) -> Iterator[tuple[Iterate, float]]:
+    """Points (r (k, dim), lambda (p,)) in the cones, of a dimensionless problem, and how far each is from a solution.
+
+    full  |u_t| is linearised in every step, with shorter steps; else not after a step that had to be short. Either way
+          solves problems that the other does not.
+    """
+    k, d = problem.q.shape
+    mu = np.where(problem.mu < SMOOTH, 1.0, np.minimum(problem.mu, ROUGH))
+    smooth = problem.mu < SMOOTH
+    scale = np.ones((k, d))
+    scale[:, 0] = 1 / mu  # r = scale x, z = scale (u + mu |u_t| n)
+    kept = np.ones((k, d), dtype=bool)
+    kept[smooth, 1:] = False
+    flat, V, p = kept.ravel(), problem.V, len(problem.s)
+    x, z, lam = np.zeros((k, d)), np.zeros((k, d)), np.zeros(p)
+    x[:, 0] = z[:, 0] = START
+    best, since, last = np.inf, 0, 1.0
+    for _ in range(ITERATIONS):
+        slip = np.sqrt(np.sum(z[:, 1:] ** 2, axis=1) + 1e-20)
+        r = scale * x
+        gap = scale * ((matrix.Q @ r.ravel() + V @ lam).reshape(k, d) + problem.q) - z
+        gap[:, 0] += np.where(smooth, 0.0, slip)
+        gap[~kept] = 0.0
+        unbalanced = V.T @ r.ravel() + problem.s
+        mean = float(np.sum(x * z)) / k
+        error = max(mean, float(np.linalg.norm(gap)) / np.sqrt(k), float(np.abs(unbalanced).max(initial=0.0)))
+        yield (coulomb_cone(r, problem.mu), lam), error
+        since = 0 if error < 0.9 * best else since + 1
+        best = min(best, error)
+        if error < NEAR or since >= STALLED or not np.isfinite(error):
+            return
+        scaling = _Scaling(x, z)
+        bend = 1.0 if full or last > STUCK else 0.0
+        shear = np.broadcast_to(np.eye(d), (k, d, d)).copy()
+        shear[:, 0, 1:] = np.where(smooth[:, None], 0.0, -bend * z[:, 1:] / slip[:, None])
+        added = (shear @ scaling.F) / (scale[:, :, None] * scale[:, None, :]) + RIDGE * np.eye(d)
+        solve = matrix.factor(None, added, flat)
+        if solve is None:
+            return
+
+        direction = partial(_direction, solve, scaling, shear, gap, scale, kept, V, unbalanced)
+        first = direction(-z)
+        if first is None:
+            return
+        length = min(1.0, 0.99 * scaling.longest(first[0], first[1]))
+        ahead = float(np.sum((x + length * first[0]) * (z + length * first[1]))) / k
+        centering = float(np.clip(np.clip(ahead / mean, 0.0, 1.0) ** 3, 1e-4 if bend else 0.1, 0.95))
+        second = scaling.corrector(first[0], first[1]) if length > 0.1 else 0.0
+        step = direction(centering * mean * scaling.inverse - z - second)
+        if step is None:
+            return
+        length = min(1.0, (SHORT if full else BOUNDARY) * scaling.longest(step[0], step[1]))
+        least = np.minimum(CENTRAL, 0.5 * scaling.centrality / mean)
+        for _ in range(30):
+            new = x + length * step[0], z + length * step[1]
+            if np.all(np.sqrt(np.maximum(_det(new[0]) * _det(new[1]), 0.0)) >= least * np.sum(new[0] * new[1]) / k):
+                break
+            length *= 0.8
+        last = length
+        x, z, lam = new[0], new[1], lam + length * step[2]
+
+
+def _direction(
+    solve: Solver,
+    scaling: _Scaling,
+    shear: np.ndarray,
+    gap: np.ndarray,
+    scale: np.ndarray,
+    kept: np.ndarray,
+    V: np.ndarray,
+    unbalanced: np.ndarray,
+    target: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """dx, dz (k, d) and dlambda (p,) with F dx + dz = target and the linearised equations; None if there are none."""
+    flat = kept.ravel()
+    right = ((_times(shear, target) - gap) / scale).ravel()[flat]
+    answer = bordered(solve, right, V[flat], V[flat], -unbalanced)
+    if answer is None:
+        return None
+    dr = np.zeros(kept.size)
+    dr[flat] = answer[0]
+    dx = dr.reshape(kept.shape) / scale
+    return dx, np.where(kept, target - _times(scaling.F, dx), 0.0), answer[1]
+
+
+class _Scaling:
+    """Nesterov and Todd's scaling of points x, z (k, d) inside Lorentz's cones: F = M M with M x = M^-1 z."""
+
+    def __init__(self, x: np.ndarray, z: np.ndarray):
+        d = x.shape[1]
+        self.x, self.z, self.sign = x, z, np.where(np.arange(d) == 0, 1.0, -1.0)
+        det_x, det_z = _det(x), _det(z)
+        unit_x, unit_z = x / np.sqrt(det_x)[:, None], z / np.sqrt(det_z)[:, None]
+        w = unit_z + self.sign * unit_x
+        w /= np.sqrt(2 * (1 + np.sum(unit_x * unit_z, axis=1)))[:, None]
+        size = np.sqrt(det_z / det_x)[:, None, None]
+        self.F = size * (2 * w[:, :, None] * w[:, None, :] - np.diag(self.sign))
+        half = w.copy()
+        half[:, 0] += 1
+        half /= np.sqrt(2 * half[:, 0])[:, None]
+        self.M = np.sqrt(size) * (2 * half[:, :, None] * half[:, None, :] - np.diag(self.sign))
+        turned = self.sign * half
+        self.M_inverse = (2 * turned[:, :, None] * turned[:, None, :] - np.diag(self.sign)) / np.sqrt(size)
+        self.inverse = self.sign * x / det_x[:, None]  # of x in Jordan's algebra
+        self.centrality = np.sqrt(det_x * det_z)
+
+    def corrector(self, dx: np.ndarray, dz: np.ndarray) -> np.ndarray:
+        """Mehrotra's second-order term of the predictor (dx, dz), in the units of z."""
+        a, b, c = _times(self.M, dx), _times(self.M_inverse, dz), _times(self.M, self.x)
+        product = np.concatenate([np.sum(a * b, axis=1)[:, None], a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:]], axis=1)
+        out = np.empty_like(product)
+        out[:, 0] = (c[:, 0] * product[:, 0] - np.sum(c[:, 1:] * product[:, 1:], axis=1)) / _det(c)
+        out[:, 1:] = (product[:, 1:] - out[:, :1] * c[:, 1:]) / c[:, :1]
+        return _times(self.M, out)
+
+    def longest(self, dx: np.ndarray, dz: np.ndarray) -> float:
+        """The longest step that keeps both points in the cones."""
+        return min(_longest(self.x, dx), _longest(self.z, dz))
+
+
+def _times(A: np.ndarray, x: np.ndarray) -> np.ndarray:
+    return np.asarray((A @ x[:, :, None])[:, :, 0])
+
+
+def _det(x: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(x[:, 1:], axis=1)
+    return np.asarray((x[:, 0] - length) * (x[:, 0] + length))
+
+
+def _longest(x: np.ndarray, dx: np.ndarray) -> float:
+    a, c = _det(dx), np.maximum(_det(x), 0.0)
+    b = 2 * (x[:, 0] * dx[:, 0] - np.sum(x[:, 1:] * dx[:, 1:], axis=1))
+    square = b * b - 4 * a * c
+    root = -0.5 * (b + np.where(b >= 0, 1.0, -1.0) * np.sqrt(np.maximum(square, 0.0)))
+    with np.errstate(all="ignore"):
+        ends = np.stack([root / a, c / root])
+    return float(np.where((ends > 0) & np.isfinite(ends) & (square >= 0), ends, np.inf).min(initial=np.inf))

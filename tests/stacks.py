@@ -1,0 +1,47 @@
+"""Blocks that rest on each other: scenes of several bodies whose forces statics alone determines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactopt import BodyForce, Contact, Material, Part, Rigid, Scene
+from contactopt.scenes.meshes import rename, tensor_mesh
+
+
+def block(low, high, cells):
+    """A box with boundaries bottom, top, left, right."""
+    mesh = tensor_mesh(*(np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells)))
+    up = "xyz"[len(low) - 1]
+    return rename(mesh, bottom=f"{up}-", top=f"{up}+", left="x-", right="x+")
+
+
+def stack(
+    count=2,
+    dim=2,
+    side=0.0,
+    weight=1.0,
+    width=1.0,
+    cells=(4, 4, 4),
+    mu=0.5,
+    kind=None,
+    order=None,
+    material=None,
+    **more,
+):
+    """`count` blocks of height one on a rigid floor. `side` and `weight` are forces per volume, along x and downwards.
+
+    cells[i] is the number of elements along each side of block i, order a permutation of the bodies.
+    """
+    kind = kind or ("plane-strain" if dim == 2 else "solid")
+    force = [0.0] * dim
+    force[0], force[-1] = side, -weight
+    up = (0.0,) * (dim - 1) + (1.0,)
+    bodies, contacts = [Rigid("floor", normal=up)], []
+    for i in range(count):
+        low, high = [0.0] * (dim - 1) + [float(i)], [width] * (dim - 1) + [i + 1.0]
+        mesh = block(low, high, [cells[i % len(cells)]] * dim)
+        made = material or Material(1000.0, 0.3)
+        bodies.append(Part(f"block{i}", mesh, made, loads=(BodyForce(tuple(force)),), contact="bottom"))
+        contacts.append(Contact(f"block{i}", f"block{i - 1}:top" if i else "floor", mu))
+    chosen = bodies if order is None else [bodies[i] for i in order]
+    return Scene("stack", bodies=tuple(chosen), contacts=tuple(contacts), kind=kind, **more)

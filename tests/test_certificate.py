@@ -1,0 +1,136 @@
+"""What "solved" promises, checked contact by contact, and the problems that fooled certificates."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from conftest import MATERIAL, block
+
+from contactopt import InterfaceProblem, Part, Rigid, Scene, Status, Support, natural_map_residual, reduce, solve
+from contactopt.problem import infeasibility
+from experiments.questions.coulomb_check import violations
+from experiments.questions.granular import packing
+from experiments.questions.search_for_lies import FAMILIES, judge, make
+
+KERNEL = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(2))  # two contacts that squeeze the same body
+NOT_SOLVABLE = {
+    "no compliance": InterfaceProblem(np.zeros((2, 2)), [[-1.0, 0.0]], 0.5),
+    "squeezed from both sides": InterfaceProblem(KERNEL, [[-1.0, 0.0], [-1.0, 0.0]], 0.3),
+    "squeezed, 3D": InterfaceProblem(np.kron(KERNEL[::2, ::2], np.eye(3)), [[-1.0, 0, 0], [-1.0, 0.2, 0]], 0.3),
+}
+METHODS = ("auto", "newton", "proximal", "nsgs", "lagrangian")
+
+
+def in_units(p, force, length):
+    return InterfaceProblem(p.Q * (length / force), p.q * length, p.mu, p.V, p.s * force)
+
+
+def worst(problem, solution):
+    Q = problem.Q.toarray() if sp.issparse(problem.Q) else problem.Q
+    found = violations(Q, problem.q, problem.mu, problem.V, problem.s, solution.reactions, solution.multipliers)
+    return max(found.values())
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("force,length", [(1, 1), (1e12, 1), (1, 1e12), (1e-12, 1e-6), (1e-6, 1e12)])
+@pytest.mark.parametrize("name", NOT_SOLVABLE)
+def test_a_problem_without_a_solution_ends_infeasible_in_all_units(name, force, length, method):
+    problem = in_units(NOT_SOLVABLE[name], force, length)
+    solution = solve(problem, method, max_iterations=100, time_limit=5)
+    assert solution.status is Status.INFEASIBLE and "no solution" in solution.message
+    ray = solution.proof
+    e = np.zeros(problem.q.shape)
+    e[:, 0] = ray.weights
+    assert np.all(ray.weights >= 0) and np.all(np.abs(problem.Q.T @ e.ravel()) <= 1e-12 * np.abs(problem.Q).max())
+    assert np.sum(problem.q * e) < 0
+
+
+@pytest.mark.parametrize("force", [0.0, 1.0, 1e10])
+@pytest.mark.parametrize("name", NOT_SOLVABLE)
+def test_no_forces_are_certified_where_there_is_no_solution(name, force):
+    problem = NOT_SOLVABLE[name]
+    r = np.zeros(problem.q.shape)
+    r[:, 0] = force
+    assert natural_map_residual(problem, r) > 0.1
+
+
+def test_forces_that_move_nothing_do_not_hide_a_penetration():
+    problem = InterfaceProblem(1e-9 * KERNEL, 1e-6 * np.array([[-1.0, 0], [2.0, 0]]), 0.3)
+    assert natural_map_residual(problem, [[5e3, 0], [5e3, 0]]) > 0.1
+    assert natural_map_residual(problem, [[1000.0, 0], [0, 0]]) < 1e-14
+    assert solve(problem).reactions[:, 0] == pytest.approx([1000.0, 0.0], rel=1e-6)
+
+
+def test_a_contact_much_stiffer_than_the_others_is_not_overlooked():
+    problem = InterfaceProblem(np.diag([1.0, 1.0, 1e-9, 1e-9]), [[-1.0, 0], [-1e-9, 0]], 0.3)
+    assert natural_map_residual(problem, [[1.0, 0], [0.5, 0]]) > 1e-6
+    assert natural_map_residual(problem, [[1.0, 0], [1.0, 0]]) < 1e-15
+
+
+@pytest.mark.parametrize("method", ["auto", "nsgs", "newton"])
+@pytest.mark.parametrize("gap", [1e4, 1e8, 1e12])
+def test_distant_open_contacts_change_nothing(gap, method):
+    rng = np.random.default_rng(3)
+    A = rng.normal(size=(12, 12))
+    Q, q = A @ A.T / 12 + 0.2 * np.eye(12), rng.normal(size=(6, 2)) - 0.3
+    near = np.arange(8)
+    alone = solve(InterfaceProblem(Q[np.ix_(near, near)], q[:4], 0.2), tol=1e-12)
+    q[4:, 0] = gap
+    solution = solve(InterfaceProblem(Q, q, 0.2), method, max_iterations=2000)
+    assert solution.solved
+    assert np.allclose(solution.reactions[:4], alone.reactions, atol=1e-6 * np.abs(alone.reactions).max())
+    assert np.all(solution.reactions[4:] == 0)
+
+
+@pytest.mark.parametrize("force,length", [(1e12, 1e-12), (1e-12, 1.0), (1.0, 1e12)])
+def test_residual_status_and_answer_do_not_depend_on_units(force, length):
+    for problem in (packing(2, 25), packing(3, 27, mu=0.2)):
+        base, units = solve(problem, max_iterations=60), solve(in_units(problem, force, length), max_iterations=60)
+        assert base.solved and units.solved
+        r = np.abs(np.random.default_rng(0).normal(size=problem.q.shape))
+        expected = natural_map_residual(problem, r)
+        assert natural_map_residual(in_units(problem, force, length), force * r) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_support_that_pushes_a_contact_into_a_rigid_floor_is_infeasible():
+    body = block("plane-strain", 0, 1)
+    supports = (Support("bottom", {"x": 0.0, "y": -0.1}),)
+    part = Part("block", body, MATERIAL, supports, contact="bottom")
+    problem = reduce(Scene("held and pushed", part, Rigid("floor"), 0.3))
+    solution = solve(problem)
+    assert solution.status is Status.INFEASIBLE, solution.message
+
+
+def test_a_plate_pushed_sideways_beyond_friction_is_infeasible_and_below_it_is_not():
+    V = np.tile(np.eye(2), (2, 1))
+    for push, feasible in ((0.5, False), (0.2, True)):
+        problem = InterfaceProblem(np.eye(4), np.zeros((2, 2)), 0.3, V, [-1.0, -push])
+        assert (infeasibility(problem) is None) == feasible
+        solution = solve(problem)
+        assert solution.solved if feasible else "balance" in solution.message
+
+
+def test_hard_problems_with_a_solution_are_never_called_infeasible():
+    for seed in range(5):
+        assert infeasibility(packing(2, 30, seed, points=2)) is None
+        assert infeasibility(packing(3, 27, seed, mu=1.0)) is None
+
+
+@pytest.mark.parametrize("family", range(len(FAMILIES)), ids=lambda i: FAMILIES[i].__name__)
+def test_no_lie_among_random_problems(family):
+    for seed in range(99_000 + family, 99_000 + family + 12 * len(FAMILIES), len(FAMILIES)):
+        assert make(seed)[0] == FAMILIES[family].__name__
+        assert judge(seed)[2] == "", seed
+
+
+def test_the_independent_check_can_fail():
+    problem = InterfaceProblem(np.eye(2), [[-1.0, 0.4]], 0.3)
+    good = solve(problem, tol=1e-12)
+    assert worst(problem, good) < 1e-10
+    for r in ([[0.9, -0.27]], [[1.0, -0.2]], [[1.0, 0.3]], [[1.0, -0.4]]):
+        found = violations(problem.Q, problem.q, problem.mu, problem.V, problem.s, np.array(r), [])
+        assert max(found.values()) > 1e-2
+        assert natural_map_residual(problem, r) > 1e-2
+
+
+def test_no_contacts_are_solved():
+    assert natural_map_residual(InterfaceProblem(np.zeros((0, 0)), np.zeros((0, 2)), 0.3), np.zeros((0, 2))) == 0.0

@@ -1,0 +1,224 @@
+"""Bodies that only contact holds: exact states, independence of how they are fixed, and loads that nothing balances."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import skfem
+import turned
+from stacks import block, stack
+
+from contactopt import (
+    BodyForce,
+    Contact,
+    InputError,
+    Material,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    reduce_bodies,
+    scenes,
+    solve,
+)
+from contactopt.analysis.quantities import elastic_energy
+from contactopt.analysis.resultants import pair_resultants
+from contactopt.bodies import assemble
+from contactopt.bodies import elastic as elastic_bodies
+from contactopt.problem.balance import escape
+
+SOFT = Material(1000.0, 0.3)
+FLOOR = Rigid("floor", normal=(0, 1))
+
+
+def alone(part, floor=FLOOR, mu=0.5, **more):
+    return Scene("alone", bodies=(part, floor), contacts=(Contact(part.name, floor.name, mu),), **more)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_block_under_its_own_weight_without_friction(dim, degree):
+    """Confined sideways it stands in uniaxial strain: pressure = weight, and its mean sinks by rho g h^2 / 3 E_oed."""
+    sides = {"left": "x-", "right": "x+"} | ({"front": "y-", "back": "y+"} if dim == 3 else {})
+    mesh = block([0.0] * dim, [1.0] * dim, [4] * dim)
+    axes = {name: ("xy".index(side[0]), float(side[1] == "+")) for name, side in sides.items()}
+    named = {name: lambda x, i=i, at=at: x[i] == at for name, (i, at) in axes.items()}
+    supports = tuple(Support(name, {side[0]: 0.0}) for name, side in sides.items())
+    load = BodyForce((0.0,) * (dim - 1) + (-2.0,))
+    part = Part("b", mesh.with_boundaries(named), SOFT, supports, (load,), contact="bottom")
+    floor = Rigid("floor", normal=(0.0,) * (dim - 1) + (1.0,))
+    reduction = reduce_bodies(alone(part, floor, 0.0, kind="plane-strain" if dim == 2 else "solid", degree=degree))
+    problem = reduction.problem
+    solution = solve(problem, tol=1e-12)
+    assert problem.motions == (f"body 'b': translation along {'xyz'[dim - 1]}",)
+    assert np.allclose(solution.reactions[:, 0] / problem.areas, 2.0, atol=1e-9)
+    stiffness = 1000.0 * 0.7 / (1.3 * 0.4)
+    if degree == 2:  # the displacement is quadratic
+        assert solution.multipliers[0] == pytest.approx(-2.0 / (3 * stiffness), rel=1e-9)
+        assert elastic_energy(reduction, solution) == pytest.approx(2.0**2 / (6 * stiffness), rel=1e-9)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_a_traction_holds_a_block_as_a_plate_does(mu):
+    """Uniform compression, once under a plate that may slide, once by a traction on a body that floats."""
+    mesh = block([0, 0], [2, 1], [6, 4])
+    pressed = Part("b", mesh, SOFT, loads=(Traction("top", (0.0, -3.0)),), contact="bottom")
+    plate = Plate("top", {"y": -6.0}, glued=False)
+    held = replace(pressed, loads=(plate,), supports=(Support("left", {"x": 0.0}),))
+    free, guided = (reduce_bodies(alone(part, mu=0.0)) for part in (pressed, held))
+    a, b = (solve(reduction.problem, tol=1e-12) for reduction in (free, guided))
+    assert np.allclose(a.reactions[:, 0], b.reactions[:, 0], atol=1e-9)
+    assert elastic_energy(free, a) == pytest.approx(elastic_energy(guided, b), rel=1e-9)
+    with_friction = solve(reduce_bodies(alone(pressed, mu=mu)).problem, tol=1e-12)
+    assert with_friction.solved and with_friction.reactions[:, 0].sum() == pytest.approx(6.0)
+
+
+def test_a_roller_between_two_plates():
+    """A disc that touches a floor and a plate: both carry the force, and the tractions mirror each other."""
+    circle = skfem.MeshTri.init_circle(4)
+    disc = circle.with_boundaries({"below": lambda x: x[1] < -0.5, "above": lambda x: x[1] > 0.5})
+    roller = Part("roller", disc, SOFT, contact="below")
+    floor = Rigid("floor", normal=(0, 1), gap=lambda x: x[1] + 1)
+    plate = Rigid("plate", normal=(0, 1), gap=lambda x: 1 - x[1], force={"y": -5.0})
+    contacts = (Contact("roller", "floor", 0.3), Contact("plate", "roller:above", 0.3))
+    reduction = reduce_bodies(Scene("roller", bodies=(roller, floor, plate), contacts=contacts))
+    solution = solve(reduction.problem, tol=1e-11)
+    below, above = pair_resultants(reduction, solution).values()
+    assert solution.solved and len(reduction.problem.s) == 4
+    assert np.allclose(below.force, [0.0, 5.0], atol=1e-9) and np.allclose(
+        above.force, [0.0, 5.0], atol=1e-9
+    )  # on the plate
+    assert below.moment[0] == pytest.approx(0.0, abs=1e-9)
+    normal = [np.sort(solution.reactions[pair.contacts, 0]) for pair in reduction.problem.pairs]
+    assert np.allclose(*normal, atol=1e-7)
+
+
+def test_a_ring_that_is_free_along_its_axis():
+    tube = Part("tube", block([1, 0], [2, 3], [4, 6]), SOFT, loads=(BodyForce((0.0, -2.0)),), contact="bottom")
+    reduction = reduce_bodies(alone(tube, mu=0.2, kind="axisymmetric"))
+    solution = solve(reduction.problem, tol=1e-11)
+    assert reduction.problem.motions == ("body 'tube': translation along z",)
+    (found,) = pair_resultants(reduction, solution).values()
+    assert found.force[1] == pytest.approx(2.0 * np.pi * (2**2 - 1**2) * 3)
+
+
+@pytest.mark.parametrize("solver", ["superlu", "multigrid"])
+def test_floating_bodies_are_in_equilibrium_inside(solver):
+    """A U = loads + contact forces at every unknown of a body that nothing holds."""
+    reduction = reduce_bodies(stack(2, 3, side=0.2), Q="implicit", solver=solver)
+    solution = solve(reduction.problem, tol=1e-9)
+    moved = reduction.displaced(solution.reactions, solution.multipliers)
+    for body, B, U in zip(reduction.bodies, reduction.maps, moved):
+        if body.fields(U) is not None:
+            error = body.body.A @ U - body.body.load - B.T @ solution.reactions.ravel()
+            assert np.abs(error).max() < 1e-6 * np.abs(body.body.load).max()
+    u = sum(B @ U for B, U in zip(reduction.maps, moved)).reshape(-1, 3)
+    u[:, 0] += reduction.gap
+    expected = reduction.problem.displacements(solution.reactions, solution.multipliers)
+    assert np.allclose(u, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_the_compliance_does_not_depend_on_the_fixing_unknowns():
+    scene = stack(1, cells=(5,))
+    made = assemble(scene, scene.parts[1], 1, None).body
+    corner, opposite = (int(choose(made.locations.sum(axis=0))) for choose in (np.argmin, np.argmax))
+    fixing = np.sort([*made.unknowns[:, corner], made.unknowns[0, opposite]])
+    other = replace(made, rigid=replace(made.rigid, fixing=fixing))
+    T = reduce_bodies(scene).maps[1]
+    first, second = (elastic_bodies.condense(body).compliance(T) for body in (made, other))
+    assert not np.array_equal(made.rigid.fixing, other.rigid.fixing)
+    assert np.allclose(first, second, atol=1e-10 * np.abs(first).max())
+    assert np.linalg.eigvalsh(first).min() > 0
+
+
+def test_the_compliance_of_a_floating_body_converges_with_the_mesh():
+    """A uniform pressure on the bottom of a free block moves it against its inertia: the same on every mesh."""
+    values = []
+    for n in (8, 16, 32):
+        problem = reduce_bodies(stack(1, cells=(n,))).problem
+        r = np.stack([problem.areas, 0 * problem.areas], axis=1).ravel()
+        values.append(float(r @ problem.Q @ r))
+    assert abs(values[2] - values[1]) < 0.3 * abs(values[1] - values[0])
+    assert values[2] == pytest.approx(values[1], rel=0.01)
+
+
+def test_multipliers_are_mean_displacements():
+    reduction = reduce_bodies(stack(1, side=0.1, degree=2))
+    solution = solve(reduction.problem, tol=1e-12)
+    body = reduction.bodies[1]
+    U = reduction.displaced(solution.reactions, solution.multipliers)[1]
+    mean = body.body.rigid.forces.T @ U
+    assert np.allclose(mean, solution.multipliers, atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [30.0, 90.0, 200.0])
+def test_a_scene_that_is_turned_has_the_same_answer(angle):
+    """The slope and the weight turn with it."""
+    R = turned.turn(angle)
+    plain = stack(1, side=0.3)
+    part, floor = plain.parts[1], plain.parts[0]
+    mesh = replace(part.mesh, doflocs=R @ part.mesh.p)
+    force = tuple(R @ np.array(part.loads[0].value))
+    other = alone(replace(part, mesh=mesh, loads=(BodyForce(force),)), replace(floor, normal=tuple(R @ [0.0, 1.0])))
+    a, b = (solve(reduce_bodies(scene).problem, tol=1e-12) for scene in (plain, other))
+    if np.linalg.norm(a.reactions - b.reactions) > 1e-9:
+        assert np.allclose(a.reactions, b.reactions[::-1], atol=1e-9)
+
+
+def test_units_do_not_matter():
+    plain, large = stack(2, side=0.2), stack(2, side=0.2e6, weight=1e6, material=Material(1e9, 0.3))
+    a, b = (solve(reduce_bodies(scene).problem, tol=1e-11) for scene in (plain, large))
+    assert np.allclose(a.reactions, b.reactions / 1e6, atol=1e-9)
+    assert np.allclose(a.multipliers, b.multipliers, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "scene,message",
+    [
+        (stack(2, side=0.6), "body 'block.' slides off .translation along x"),
+        (stack(2, 3, side=0.6, width=3.0), "body 'block.' slides off .translation along x"),
+        (stack(2, weight=-1.0), "no contact holds body 'block.' .translation along y"),
+        (
+            stack(8, side=0.3, width=1.0),
+            "more than the contacts can hold: body 'block.' tips over .rotation in the x-y plane",
+        ),
+        (stack(2, kind="axisymmetric", weight=-1.0), "no contact holds body 'block.' .translation along z"),
+    ],
+    ids=["slides", "slides-3d", "lifts", "tips", "axis"],
+)
+def test_loads_that_nothing_balances_name_body_and_motion(scene, message):
+    with pytest.raises(InputError, match=message):
+        solve(reduce_bodies(scene).problem)
+
+
+@pytest.mark.parametrize("side,holds", [(0.49, True), (0.51, False)])
+def test_friction_holds_up_to_its_limit(side, holds):
+    problem = reduce_bodies(stack(2, side=side, width=4.0, mu=0.5)).problem
+    assert (escape(problem) is None) == holds
+    if holds:
+        assert solve(problem, tol=1e-9).solved
+
+
+@pytest.mark.parametrize("side,holds", [(0.32, True), (0.35, False)])
+def test_a_tower_stands_up_to_its_limit(side, holds):
+    """Three blocks of width one: the resultant leaves the base at side / weight = width / height = 1 / 3."""
+    problem = reduce_bodies(stack(3, side=side, mu=5.0)).problem
+    assert (escape(problem) is None) == holds
+
+
+def test_plates_that_are_pulled_off_are_named():
+    scene = scenes.flat_punch(2, elements=6)
+    lifted = replace(scene, upper=replace(scene.upper, loads=(Plate("top", {"y": 10.0}),)))
+    with pytest.raises(InputError, match=r"pulls the bodies apart.*body 'punch' .plate 'top' along y"):
+        solve(reduce_bodies(lifted).problem)
+
+
+def test_a_body_far_from_the_origin_floats_as_well():
+    near, far = stack(1, side=0.2), stack(1, side=0.2)
+    part = far.parts[1]
+    moved = replace(part, mesh=replace(part.mesh, doflocs=part.mesh.p + 1e4))
+    floor = Rigid("floor", normal=(0, 1), gap=lambda x: x[1] - 1e4)
+    a, b = (solve(reduce_bodies(scene).problem, tol=1e-9) for scene in (near, alone(moved, floor)))
+    assert np.allclose(a.reactions, b.reactions, atol=1e-6)

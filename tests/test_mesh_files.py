@@ -1,0 +1,274 @@
+"""Meshes from files: geometry and groups as they were written, faults repaired or refused in a sentence."""
+
+import logging
+import os
+
+import meshio
+import numpy as np
+import pytest
+import skfem
+
+from contactopt import InputError, load_mesh
+from contactopt.scenes import mesh_formats
+from contactopt.scenes.mesh_files import name_boundaries
+
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0.0]])
+TWO = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+
+
+def volume(mesh):
+    return skfem.Basis(mesh, mesh.elem(), intorder=6).dx.sum()
+
+
+def flux(mesh, boundary=None):
+    """Integral of x . n, the normal as contact uses it; dim times the volume on the whole surface."""
+    facets = mesh.boundary_facets() if boundary is None else mesh.boundaries[boundary]
+    at = skfem.FacetBasis(mesh, mesh.elem(), facets=facets, intorder=8)
+    return np.sum(np.asarray(at.normals) * np.asarray(at.global_coordinates()) * at.dx)
+
+
+def write(path, points, cells, **more):
+    meshio.write(path, meshio.Mesh(points, cells, **more))
+    return path
+
+
+@pytest.fixture
+def gmsh():
+    module = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    module.initialize(interruptible=False)
+    module.option.setNumber("General.Terminal", 0)
+    yield module
+    module.finalize()
+
+
+def disc_in_plate(gmsh, path, dim, order, recombine=False, incomplete=False, version=4.1):
+    """A disc (cylinder) of radius 1 in a square plate of side 4, conforming, with a group 'rim' between them."""
+    for option, value in {
+        "Mesh.SecondOrderIncomplete": incomplete, "Mesh.RecombineAll": recombine,
+        "Mesh.MeshSizeMax": 0.3 if dim == 2 else 0.7, "Mesh.MshFileVersion": version,
+    }.items():  # fmt: skip
+        gmsh.option.setNumber(option, float(value))
+    if dim == 2:
+        tools = [(2, gmsh.model.occ.addRectangle(-2, -2, 0, 4, 4))], [(2, gmsh.model.occ.addDisk(0, 0, 0, 1, 1))]
+    else:
+        box, cylinder = gmsh.model.occ.addBox(-2, -2, 0, 4, 4, 1), gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 1, 1)
+        tools = [(3, box)], [(3, cylinder)]
+    gmsh.model.occ.fragment(*tools)
+    gmsh.model.occ.synchronize()
+    disc, plate = sorted(
+        (tag for _, tag in gmsh.model.getEntities(dim)), key=lambda tag: gmsh.model.occ.getMass(dim, tag)
+    )
+    rim = [tag for _, tag in gmsh.model.getBoundary([(dim, disc)], oriented=False)]
+    rim = [tag for tag in rim if dim == 2 or gmsh.model.getType(2, tag) == "Cylinder"]
+    gmsh.model.addPhysicalGroup(dim, [disc], name="disc")
+    gmsh.model.addPhysicalGroup(dim, [plate], name="plate")
+    gmsh.model.addPhysicalGroup(dim - 1, rim, name="rim")
+    gmsh.model.mesh.generate(dim)
+    gmsh.model.mesh.setOrder(order)
+    gmsh.write(str(path))
+    return path
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize(
+    "dim,order,recombine,incomplete,kind",
+    [
+        (2, 1, False, False, "MeshTri1"),
+        (2, 1, True, False, "MeshQuad1"),
+        (2, 2, False, False, "MeshTri2"),
+        (2, 2, True, False, "MeshQuad2"),
+        (2, 2, True, True, "MeshQuad2"),
+        (3, 1, False, False, "MeshTet1"),
+        (3, 2, False, False, "MeshTet2"),
+    ],
+)
+def test_gmsh_parts_share_a_rim_with_opposite_normals(gmsh, tmp_path, version, dim, order, recombine, incomplete, kind):
+    path = disc_in_plate(gmsh, tmp_path / "a.msh", dim, order, recombine, incomplete, version)
+    disc, plate = load_mesh(path, "disc"), load_mesh(path, "plate", scale=10)
+    assert type(disc).__name__ == type(plate).__name__ == kind
+    assert volume(disc) + volume(plate) / 10**dim == pytest.approx(16, rel=1e-12)  # 4 x 4 (x 1)
+    assert volume(disc) == pytest.approx(np.pi, rel={1: 0.15, 2: 3e-3}[order])
+    for mesh in (disc, plate):
+        assert flux(mesh) == pytest.approx(dim * volume(mesh), rel=1e-9)  # every normal points outward
+    assert flux(disc, "rim") == pytest.approx(-flux(plate, "rim") / 10**dim, rel=1e-12)
+    assert flux(disc, "rim") > 0
+    with pytest.raises(InputError, match=r"no group 'ring'.*groups of elements are disc, plate"):
+        load_mesh(path, "ring")
+    with pytest.raises(InputError, match="'rim' is a group of facets, a boundary"):
+        load_mesh(path, "rim")
+
+
+def curved_bricks():
+    """Bricks of second order under a quadratic map, which serendipity elements hold exactly."""
+    mesh = skfem.MeshHex2.from_mesh(skfem.MeshHex().refined(1))
+    x, y, z = mesh.p
+    return skfem.MeshHex2(np.stack([x + 0.2 * y * z, y + 0.3 * x**2, z + 0.1 * x * y - 0.2 * y**2]), mesh.t)
+
+
+@pytest.mark.parametrize("kind,nodes", [("hexahedron20", 20), ("hexahedron27", 27), ("hexahedron", 8)])
+def test_bricks_of_every_order_keep_their_shape(tmp_path, kind, nodes):
+    exact = curved_bricks()
+    cells = skfem.io.meshio.to_meshio(exact, encode_cell_data=False).cells[0].data[:, :nodes]
+    path = write(tmp_path / "a.vtu", exact.p.T, [(kind, cells)])
+    mesh = load_mesh(path)
+    assert flux(mesh) == pytest.approx(3 * volume(mesh))
+    if nodes > 8:
+        assert type(mesh) is skfem.MeshHex2 and mesh.p.shape == exact.p.shape
+        found = mesh.p[:, np.lexsort(np.round(mesh.p, 9))]
+        np.testing.assert_allclose(found, exact.p[:, np.lexsort(np.round(exact.p, 9))], atol=1e-12)
+        assert volume(mesh) == pytest.approx(volume(exact), rel=1e-12)
+
+
+@pytest.mark.parametrize("name,how", [
+    ("a.msh", {"file_format": "gmsh22"}), ("b.msh", {"file_format": "gmsh"}), ("a.vtu", {}), ("a.vtk", {}), ("a.inp", {}),
+    ("a.mesh", {}), ("a.nas", {}), ("a.xdmf", {"data_format": "XML"}), ("a.dat", {"file_format": "tecplot"}),
+])  # fmt: skip
+def test_formats_of_meshio(tmp_path, name, how):
+    mesh = skfem.MeshTet().refined(1)
+    meshio.write(tmp_path / name, meshio.Mesh(mesh.p.T, [("tetra", mesh.t.T)]), **how)
+    found = load_mesh(tmp_path / name)
+    assert found.nelements == mesh.nelements and volume(found) == pytest.approx(1.0)
+    np.testing.assert_allclose(found.p[:, np.lexsort(found.p)], mesh.p[:, np.lexsort(mesh.p)], atol=1e-12)
+
+
+def test_sets_of_abaqus_and_numbers_without_names(tmp_path):
+    path = write(
+        tmp_path / "a.inp", SQUARE, [("quad", TWO)], point_sets={"floor": np.array([0, 1, 2]), "corner": np.array([0])},
+        cell_sets={"left": [np.array([0])], "right": [np.array([1])]},
+    )  # fmt: skip
+    whole, left = load_mesh(path), load_mesh(path, "left")
+    assert whole.nelements == 2 and left.nelements == 1
+    assert (
+        set(whole.boundaries) == {"floor"}
+        and len(whole.boundaries["floor"]) == 2
+        and len(left.boundaries["floor"]) == 1
+    )
+    tags = {"gmsh:physical": [np.array([3, 4])]}
+    path = write(tmp_path / "a.vtu", SQUARE, [("quad", TWO)], cell_data={"part": [np.array([3, 4])]})
+    assert load_mesh(path, "part=4").p[0].min() == 1
+    both = meshio.Mesh(SQUARE, [("quad", TWO)], cell_data=tags | {"gmsh:geometrical": tags["gmsh:physical"]})
+    path = tmp_path / "a.msh"
+    meshio.write(path, both, file_format="gmsh22")
+    assert load_mesh(path, "4").p[0].min() == 1
+
+
+def test_a_plane_mesh_may_lie_across_any_axis(tmp_path):
+    for across in range(3):
+        points = np.insert(SQUARE[:, :2], across, 5.0, axis=1)
+        mesh = load_mesh(write(tmp_path / "a.vtu", points, [("quad", TWO)]))
+        np.testing.assert_array_equal(np.ptp(mesh.p, axis=1), [2, 1])
+    bent = SQUARE.copy()
+    bent[:, 2] = [0, 1, 3, 0, 1, 3]
+    with pytest.raises(InputError, match="a surface in space only"):
+        load_mesh(write(tmp_path / "a.vtu", bent, [("quad", TWO)]))
+
+
+def test_repairs_are_logged(tmp_path, caplog):
+    points = np.concatenate([SQUARE, SQUARE[[1, 4]] + 1e-9, [[7, 7, 0]]])  # a double seam and a lonely node
+    cells = np.array(
+        [[0, 1, 4, 3], [6, 7, 5, 2], [4, 3, 0, 1]]
+    )  # the second the wrong way round, the third the first again
+    with caplog.at_level(logging.INFO):
+        mesh = load_mesh(write(tmp_path / "a.vtu", points, [("quad", cells)]))
+    assert mesh.nelements == 2 and mesh.p.shape[1] == 6 and volume(mesh) == pytest.approx(2, rel=1e-8)
+    assert flux(mesh) == pytest.approx(4)
+    for what in (
+        "nodes that lie on others",
+        "1 elements are there twice",
+        "quad number 2 of the file",
+        "3 nodes of the file",
+    ):
+        assert what in caplog.text
+
+
+@pytest.mark.parametrize("kind", ["triangle6", "quad9", "tetra10", "hexahedron27"])
+def test_elements_the_wrong_way_round_are_turned_with_all_their_nodes(tmp_path, kind):
+    """A mirror image has every element the wrong way round."""
+    mesh = {
+        "triangle6": skfem.MeshTri2.init_circle(2), "quad9": skfem.MeshQuad2.from_mesh(skfem.MeshQuad().refined(1)),
+        "tetra10": skfem.MeshTet2.init_ball(1), "hexahedron27": curved_bricks(),
+    }[kind]  # fmt: skip
+    original = skfem.io.meshio.to_meshio(mesh, encode_cell_data=False)
+    points = mesh.p.T * np.array([-1, 1, 1])[: len(mesh.p)]
+    found = load_mesh(write(tmp_path / "a.vtu", np.pad(points, [(0, 0), (0, 3 - len(mesh.p))]), original.cells))
+    assert volume(found) == pytest.approx(volume(mesh), rel=1e-12)
+    assert flux(found) == pytest.approx(len(mesh.p) * volume(mesh), rel=1e-9)
+    np.testing.assert_allclose(np.sort(found.p[0]), np.sort(-mesh.p[0]), atol=1e-14)
+
+
+def test_faults_are_refused_with_the_element(tmp_path):
+    def refused(message, points, cells, **more):
+        with pytest.raises(InputError, match=message) as caught:
+            load_mesh(write(tmp_path / "a.vtu", np.asarray(points, dtype=float), cells, **more))
+        assert "\n" not in str(caught.value)
+
+    flat = SQUARE.copy()
+    flat[[2, 5]] = [[1, 0.3, 0], [1, 0.6, 0]]
+    refused(r"quad number 2 of the file, at \(1, 0.475\) has no volume", flat, [("quad", TWO)])
+    folded = SQUARE.copy()
+    folded[5] = [1.2, 0.2, 0]
+    refused("quad number 2 of the file.* folds over", folded, [("quad", TWO)])
+    refused("two corners coincide in quad number 2", SQUARE, [("quad", [[0, 1, 4, 3], [1, 2, 2, 4]])])
+    refused("mixes elements of type quad and triangle", SQUARE, [("quad", TWO[:1]), ("triangle", [[1, 2, 5]])])
+    lost = SQUARE.copy()
+    lost[5, 1] = np.nan
+    refused("coordinates of node 6", lost, [("quad", TWO)])
+    refused("a quad names a node that is not there", SQUARE, [("quad", [[0, 1, 4, 33]])])
+    refused("no elements of a body", SQUARE, [("line", [[0, 1]])])
+    refused("type 'wedge' cannot be used", np.random.default_rng(0).random((6, 3)), [("wedge", [[0, 1, 2, 3, 4, 5]])])
+    apart = np.concatenate([SQUARE[[0, 1, 4, 3]], SQUARE[[1, 2, 5, 4]] + [1, 0, 0]])
+    two = [("quad", np.arange(8).reshape(2, 4))]
+    refused("falls into 2 pieces that share no node; mesh it in one piece", apart, two)
+    refused("choose the body by its group, one of part=1, part=2", apart, two, cell_data={"part": [np.array([1, 2])]})
+    fan = [[0, 0, 0], [0, 1, 0], [1, 0, 0], [-1, 0, 0], [2, 0.5, 0]]
+    refused("more than two elements share a facet", fan, [("triangle", [[0, 2, 1], [0, 1, 3], [0, 4, 1]])])
+    curved = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 0, 0], [0.1, 0.1, 0], [0, 0.5, 0]])
+    refused("triangle6 number 1 of the file.* folds over", curved, [("triangle6", [range(6)])])
+
+
+def test_coincident_nodes_of_two_bodies_stay_apart(tmp_path):
+    points = np.concatenate([SQUARE[[0, 1, 4, 3]], SQUARE[[1, 2, 5, 4]]])
+    path = write(
+        tmp_path / "a.vtu", points, [("quad", np.arange(8).reshape(2, 4))], cell_data={"part": [np.array([1, 2])]}
+    )
+    assert load_mesh(path, "part=1").nelements == 1
+    with pytest.raises(InputError, match=r"2 pieces.* one of part=1, part=2"):
+        load_mesh(path)
+
+
+def test_hostile_files_end_in_one_sentence(tmp_path, monkeypatch):
+    good = write(tmp_path / "a.msh", SQUARE, [("quad", TWO)])
+    data = good.read_bytes()
+    (tmp_path / "folder.msh").mkdir()
+    os.mkfifo(tmp_path / "pipe.msh")
+    contents = {
+        "empty.msh": b"", "text.msh": b"hello\n", "zeros.vtu": bytes(1000), "wrong.vtu": data, "cut.msh": data[:-60],
+        "half.msh": data[: len(data) // 2], "none.xyz": data, "noending": data, "picture.inp": b"\x89PNG\r\n" + bytes(range(256)),
+        "many.msh": b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 999999999999 1 999999999999\n2 1 0 999999999999\n1\n",
+    }  # fmt: skip
+    for name, content in contents.items():
+        (tmp_path / name).write_bytes(content)
+    for name in [*contents, "folder.msh", "pipe.msh", "missing.msh"]:
+        with pytest.raises(InputError, match=name) as caught:
+            load_mesh(tmp_path / name)
+        assert "\n" not in str(caught.value) and len(str(caught.value)) < 500
+    monkeypatch.setattr(mesh_formats, "LARGEST", 10)
+    with pytest.raises(InputError, match="bytes"):
+        load_mesh(good)
+    monkeypatch.undo()
+    meshio.write(tmp_path / "a.dat", meshio.Mesh(SQUARE[:, :2], [("quad", TWO)]), file_format="tecplot")
+    (tmp_path / "cut.dat").write_bytes((tmp_path / "a.dat").read_bytes()[:-40])
+    monkeypatch.setattr(mesh_formats, "PATIENCE", (2.0, 0.0))
+    with pytest.raises(InputError, match="tecplot"):  # whose reader waits for the end of a file for ever
+        load_mesh(tmp_path / "cut.dat")
+
+
+def test_boundaries_by_place():
+    mesh = name_boundaries(
+        skfem.MeshQuad().refined(2), {"floor": {1: (0.0, 0.0)}, "part": {1: (1.0, 1.0), 0: (0.0, 0.5)}}
+    )
+    assert len(mesh.boundaries["floor"]) == 4 and len(mesh.boundaries["part"]) == 2
+    with pytest.raises(InputError, match=r"no facet.*'roof'; the body reaches from \(0, 0\) to \(1, 1\)"):
+        name_boundaries(mesh, {"roof": {1: (2.0, 2.0)}})
+    with pytest.raises(InputError, match="scale"):
+        load_mesh("a.msh", scale=-1)
