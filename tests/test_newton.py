@@ -68,7 +68,7 @@ def test_matrix_free_newton_takes_the_same_steps(name):
     dense, free = solve(problem, "newton", tol=1e-9), solve(problem, "newton", tol=1e-9, linear="krylov")
     assert free.solved and free.iterations <= dense.iterations + 2  # its steps are no more accurate than pays
     assert np.allclose(free.reactions, dense.reactions, atol=1e-7)
-    with pytest.raises(InputError, match="choose dense or krylov"):
+    with pytest.raises(InputError, match="choose dense, krylov or coupled"):
         solve(problem, "newton", linear="magic")
 
 

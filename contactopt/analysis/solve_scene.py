@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from contactopt.analysis.constants import COARSEST, FACTOR, ROUGH
+from contactopt.analysis.progress import progress_lines
 from contactopt.interface.reduction import Reduction, reduce_bodies
 from contactopt.problem import Solution
 from contactopt.problem.convolution import Convolution
@@ -38,7 +39,7 @@ class Options:
     method : as for contactopt.solve
     tol : bound on the natural-map residual
     settings : further arguments of contactopt.solve: limits, and settings of a method that is given by its name
-    note : receives one short sentence before every step that takes time
+    note : receives one short sentence before every step that takes time, and in long solves one after each iteration
     """
 
     Q: str = "auto"
@@ -86,8 +87,8 @@ def solve_scene(
     elements : across the contact half-width; the scene's own number by default
     zone : half-width of contact that the mesh resolves [length]; the scene's first guess by default
     options : how to solve it
-    start : the same scene solved on another mesh, to start from. Without one, where Q is known by its products, the scene
-        is first solved on a coarser mesh, if its bodies can make one.
+    start : the same scene solved on another mesh, to start from. Without one, where Newton's steps take products with Q,
+        the scene is first solved on a coarser mesh, if its bodies can make one.
 
     Raises
     ------
@@ -98,17 +99,18 @@ def solve_scene(
     options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
     reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver)
     seconds = Counter(reduction.seconds)
-    coarser = elements // (2 if reduction.iterative else FACTOR[scene.dim])
-    bodies = isinstance(reduction.problem.Q, InterfaceOperator) and not isinstance(reduction.problem.Q, Convolution)
-    if (
-        start is None and bodies and not scene.given and coarser >= COARSEST
-    ):  # half-spaces have coarse grids of their own
+    operator = reduction.problem.Q
+    products = isinstance(operator, InterfaceOperator) and operator.coupled is None
+    products = products and not isinstance(operator, Convolution)  # half-spaces have coarse grids of their own
+    coarser = elements // FACTOR[scene.dim]
+    if start is None and products and not scene.given and coarser >= COARSEST:
         begin = time.perf_counter()
         start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
         seconds.update({"coarse": time.perf_counter() - begin})
     options.note(f"solving {reduction.problem.contacts} contacts")
     first = None if start is None else transfer(start.reduction.problem, start.solution, reduction.problem)
-    solution = solve(reduction.problem, start=first, **options.of_solve)
+    lines = progress_lines(options.note, reduction.problem, options.tol)
+    solution = solve(reduction.problem, start=first, **({"progress": lines} | options.of_solve))
     seconds.update(solution.seconds)
     log.info("%s: %d elements, %s after %d iterations", scene.name, elements, solution.status, solution.iterations)
     return Solved(reduction, replace(solution, seconds=dict(seconds)))

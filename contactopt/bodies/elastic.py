@@ -23,13 +23,14 @@ import scipy.sparse as sp
 
 from contactopt.bodies.body import Assembly, build_body, reload_body
 from contactopt.bodies.fields import Fields, fields_of
-from contactopt.bodies.protocol import Mesh, Product, Surface
+from contactopt.bodies.protocol import Equilibrium, Mesh, Product, Surface
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)
+RIGID = 1e-9  # forces below this fraction of those of a plate's motion are rounding
 KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body's stiffness is free
 
 
@@ -76,6 +77,14 @@ class ElasticBody:
     @property
     def parallel(self) -> bool:
         return self.solver.releases_lock
+
+    @cached_property
+    def equilibrium(self) -> Equilibrium | None:
+        iteration, kept = self.solver.iteration, self.kept
+        if iteration is None:
+            return None
+        everywhere = sp.identity(len(self.body.load), format="csr")
+        return Equilibrium(*iteration, self.body.A.diagonal()[kept], kept, self._low_rank(everywhere))
 
     @property
     def interface_compliance(self) -> np.ndarray:
@@ -274,8 +283,12 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     made = make_solver(solver, System(A, node[kept], component[kept], body.locations, last))
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
     relief = _relief(body, made, kept)
-    extended = body.motion.copy()
-    extended[kept] -= made.solve((body.A @ body.motion)[kept])
+    # A plate that alone holds a body along itself moves it as a rigid whole, for which there is nothing to solve.
+    extended = _rigid_extension(body)
+    lacking, forces = (np.abs((body.A @ motion)[kept]).max(axis=0, initial=0.0) for motion in (extended, body.motion))
+    strained = lacking > RIGID * forces
+    if strained.any():
+        extended[np.ix_(kept, strained)] -= made.solve((body.A @ extended[:, strained])[kept])
     if len(body.rigid.names):
         extended -= body.rigid.fields @ (body.rigid.forces.T @ extended)
     K = extended.T @ (body.A @ extended)
@@ -294,6 +307,21 @@ def _relief(body: Assembly, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
         Y[kept] = solver.solve(S[kept])
         Y -= Z @ (S.T @ Y) / 2
     return Y
+
+
+def _rigid_extension(body: Assembly) -> np.ndarray:
+    """The unit motions of the plates (n, p) with the unknowns of the same component moved along by as much.
+
+    These are translations of the body where no support holds another part of it in that component. The free unknowns of a
+    body that is held elsewhere stay at rest.
+    """
+    extended, fixed = body.motion.copy(), np.ones(len(body.load), dtype=bool)
+    fixed[body.free] = False
+    for column in extended.T:
+        component = next(row for row in body.unknowns if column[row].any())
+        if np.all(column[component][fixed[component]] == 1.0):
+            column[component] = 1.0
+    return np.asarray(extended)
 
 
 def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:

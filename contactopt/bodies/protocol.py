@@ -55,6 +55,26 @@ class Mesh:
 
 
 @dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """The linear system of a body that is solved by iteration, by what each iteration needs.
+
+    With E (n, j) the columns of the identity for the unknowns `free`, the compliance is C = E A^-1 E' + L R', whose second term is symmetric as well.
+
+    stiffness  x (j,) -> A x [force]
+    cycle      f (j,) -> B f, symmetric positive definite and close to A^-1 f [length]
+    diagonal   (j,) diagonal of A
+    free       (j,) numbers of the displacement unknowns that A has
+    low_rank   L and R (n, i): plates that supports resist, free motions of a body that floats
+    """
+
+    stiffness: Callable[[np.ndarray], np.ndarray]
+    cycle: Callable[[np.ndarray], np.ndarray]
+    diagonal: np.ndarray
+    free: np.ndarray
+    low_rank: tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
 class Surface:
     """A candidate contact surface of one body: k contacts and m nodes.
 
@@ -165,6 +185,10 @@ class Body(Protocol):
 
     @property
     def parallel(self) -> bool: ...
+
+    @property
+    def equilibrium(self) -> Equilibrium | None:
+        """Its linear system where it is solved by iteration; None where products are direct."""
 
     def product(self, T: sp.csr_matrix) -> Product:
         """Products with T C T', for a sparse map T (rows, n) of the contact unknowns; what they need is prepared once."""

@@ -27,6 +27,7 @@ class RigidBody:
     unknowns = interface_unknowns = 0
     meshed = parallel = iterative = False
     complete = True
+    equilibrium = None
 
     @property
     def name(self) -> str:

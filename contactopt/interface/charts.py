@@ -78,11 +78,19 @@ def lay_out(contacts: ContactPoints, copies: int, axisymmetric: bool) -> tuple[C
         frames = np.stack([contacts.normals.T, _clockwise(contacts.normals).T], axis=1)
         places, mirrored, period = _line(contacts, frames[:, 1].T, planes, mirrors)
         order = np.argsort(places[0], kind="stable")
-        return Chart(places[:, order], mirrored, period), frames[order], order
+        return Chart(places[:, order], mirrored, period, _renumbered(contacts.cells, order)), frames[order], order
     axes = _axes(contacts, planes)
     places, mirrored = _plane(contacts, axes, planes, mirrors)
     order = np.lexsort([_rank(row, contacts.size) for row in places])
-    return Chart(places[:, order], mirrored), _frames(contacts.normals, axes)[order], order
+    chart = Chart(places[:, order], mirrored, None, _renumbered(contacts.cells, order))
+    return chart, _frames(contacts.normals, axes)[order], order
+
+
+def _renumbered(cells: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """The corners (v, c) of cells by the numbers that the contacts have in their new order (k,)."""
+    number = np.empty(len(order), dtype=int)
+    number[order] = np.arange(len(order))
+    return number[cells]
 
 
 def _clockwise(normals: np.ndarray) -> np.ndarray:

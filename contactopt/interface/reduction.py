@@ -30,6 +30,7 @@ from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
 from contactopt.interface.coupling import Coupling, couple
+from contactopt.interface.equilibrium import coupled_form
 from contactopt.problem import InterfaceProblem, Law, Pair
 from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import make_law
@@ -325,7 +326,8 @@ def _operator(
     diagonal = estimate_diagonal(product, weights, np.any(moved, axis=0))
     complete, iterative = all(body.complete for body in bodies), any(body.iterative for body in bodies)
     entries = (lambda: dense(_entries(bodies, maps))) if complete else None
-    return InterfaceOperator(product, diagonal, entries, None, iterative)
+    coupled = coupled_form(bodies, maps) if iterative else None
+    return InterfaceOperator(product, diagonal, entries, None, iterative, coupled)
 
 
 def _filling(maps: Sequence[sp.csr_matrix]) -> int:

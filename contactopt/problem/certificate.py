@@ -50,6 +50,18 @@ DUST = 1e-5  # share of the force that closes the gaps below which forces are ro
 STIFFEST = 1e4  # largest rho_i, over the mean one
 
 
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """Q r, known from displacements that are carried along with the forces r.
+
+    value     (k dim,) [length]
+    accuracy  error of these displacements in the energy norm, relative to them: how far the bodies are from equilibrium
+    """
+
+    value: np.ndarray
+    accuracy: float
+
+
 @dataclass(frozen=True)
 class Yardsticks:
     """What errors are compared with: a force F, a length L, and the steps rho (k,) of the natural map [force/length]."""
@@ -61,7 +73,10 @@ class Yardsticks:
 
 @np.errstate(all="ignore")  # numbers beyond the range of floats are no solution
 def natural_map_residual(
-    problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray | None = None
+    problem: InterfaceProblem,
+    reactions: np.ndarray,
+    multipliers: np.ndarray | None = None,
+    moved: Moved | None = None,
 ) -> float:
     """How far reactions are from a solution, dimensionless: the certificate, as in the head of this module.
 
@@ -70,6 +85,7 @@ def natural_map_residual(
     problem : the interface problem
     reactions : (k, dim) forces, normal first [force]
     multipliers : (p,) displacements of the plates [length]; None: those that fit best (`fit_multipliers`)
+    moved : Q r where it is known already; then its accuracy counts as well
 
     Returns
     -------
@@ -84,7 +100,7 @@ def natural_map_residual(
         return np.inf
     if len(r) == 0:
         return balance_residual(problem, r)
-    d = np.asarray(problem.Q @ r.ravel()).reshape(r.shape)
+    d = np.asarray(problem.Q @ r.ravel() if moved is None else moved.value).reshape(r.shape)
     w = problem.q + (problem.V @ lam).reshape(r.shape)
     u = d + w
     measure = yardsticks(problem, r, d, w)
@@ -95,6 +111,7 @@ def natural_map_residual(
         float(np.max(errors)) / measure.force,
         float(np.max(beyond)) / measure.force,
         balance_residual(problem, r, measure.force),
+        0.0 if moved is None else moved.accuracy,
     )
     return worst if np.isfinite(worst) else np.inf
 

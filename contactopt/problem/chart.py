@@ -22,12 +22,15 @@ class Chart:
     places    (dim - 1, k) coordinates [length]
     mirrored  (dim - 1,) whether the surface goes on beyond x_i = 0 as its own mirror image (a symmetry plane or an axis)
     period    length of a contact line that is closed [length]; None where it has ends, and in 3D
+    cells     (v, c) contacts at the corners of the lines, triangles or quadrilaterals that cover the surface; None where they
+              are not known
     Raises InputError on shapes that do not fit and on numbers that are not finite.
     """
 
     places: np.ndarray
     mirrored: tuple[bool, ...]
     period: float | None = None
+    cells: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         places = np.array(self.places, dtype=float)

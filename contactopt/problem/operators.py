@@ -17,6 +17,7 @@ from scipy.sparse.linalg import LinearOperator
 
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
+from contactopt.problem.coupled import CoupledForm
 
 log = logging.getLogger(__name__)
 
@@ -39,6 +40,7 @@ class InterfaceOperator(LinearOperator):
     accuracy   relative, of the products; None: the best there is
     held       (n,) mask of the components that cannot move
     inexact    whether a lower accuracy makes a product cheaper
+    coupled    the same Q before condensation, where the bodies are solved by iteration; None elsewhere
     products   number of columns multiplied so far
     """
 
@@ -49,10 +51,11 @@ class InterfaceOperator(LinearOperator):
         entries: Callable[[], np.ndarray] | None = None,
         accuracy: float | None = None,
         inexact: bool = False,
+        coupled: CoupledForm | None = None,
     ):
         super().__init__(np.dtype(float), (len(diagonal), len(diagonal)))
         self.product, self.diagonal, self.entries = product, diagonal, entries
-        self.accuracy, self.inexact = accuracy, inexact
+        self.accuracy, self.inexact, self.coupled = accuracy, inexact, coupled
         self.held = self.diagonal == 0
         self.count = [0]
 
@@ -94,13 +97,15 @@ class InterfaceOperator(LinearOperator):
 
         entries = self.entries
         exact = None if entries is None else lambda: factor * entries() + np.diag(added)
-        scaled = InterfaceOperator(product, factor * self.diagonal + added, exact, self.accuracy, self.inexact)
+        coupled = None if self.coupled is None else self.coupled.scaled(factor, added)
+        diagonal = factor * self.diagonal + added
+        scaled = InterfaceOperator(product, diagonal, exact, self.accuracy, self.inexact, coupled)
         scaled.held = self.held
         return scaled
 
     def loosened(self, accuracy: float) -> InterfaceOperator:
         """The same operator, its products no more accurate than that; both count together."""
-        loose = InterfaceOperator(self.product, self.diagonal, self.entries, accuracy, self.inexact)
+        loose = InterfaceOperator(self.product, self.diagonal, self.entries, accuracy, self.inexact, self.coupled)
         loose.held, loose.count = self.held, self.count
         return loose
 

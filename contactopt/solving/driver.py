@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -22,9 +22,10 @@ from contactopt.problem import (
     natural_map_residual,
 )
 from contactopt.problem.balance import escape, sentence
+from contactopt.problem.certificate import Moved
 from contactopt.problem.operators import InterfaceOperator, loosened
 from contactopt.solving.deadline import TimeUp, until
-from contactopt.solving.methods import Iterate, Method, default_method, find_method, solvers_of, solves
+from contactopt.solving.methods import Iterate, Known, Method, default_method, find_method, solvers_of, solves
 from contactopt.solving.notes import collected
 
 CYCLE = 12  # longest cycle that is looked for
@@ -136,7 +137,7 @@ def _run(
         iterate, ended, message = _next(steps, recorder.left())
         recorder.clock += time.perf_counter() - begin
         if iterate is not None:
-            ended = recorder.record(*iterate, {} if operator is None else {"products": operator.products})
+            ended = recorder.record(iterate, _counts(operator))
     status = Status.SOLVED if recorder.residual <= tol else ended
     proof = None
     if status is not Status.SOLVED and recorder.residual > CLOSE:
@@ -157,7 +158,7 @@ def _run(
     )
 
 
-def _next(steps: Iterator[Iterate], left: float) -> tuple[Iterate | None, Status | None, str]:
+def _next(steps: Iterator[Iterate | Known], left: float) -> tuple[Iterate | Known | None, Status | None, str]:
     """The next iterate of a method with `left` seconds to go; without one, how the iteration ended and why."""
     try:
         with np.errstate(all="ignore"), until(time.perf_counter() + left):  # what overflows is seen below
@@ -170,9 +171,17 @@ def _next(steps: Iterator[Iterate], left: float) -> tuple[Iterate | None, Status
         return None, Status.BACKEND_FAILED, f"the method broke down in its linear algebra: {error}"
     if iterate is None:
         return None, Status.SETTLED, ""
-    if not all(np.all(np.isfinite(part)) for part in iterate):
+    if not all(np.all(np.isfinite(part)) for part in iterate[:2]):
         return None, Status.DIVERGED, ""
     return iterate, None, ""
+
+
+def _counts(operator: InterfaceOperator | None) -> dict[str, float]:
+    """What a method has spent so far: products with Q and, where it works on the bodies themselves, V-cycles."""
+    if operator is None:
+        return {}
+    counts: dict[str, float] = {"products": operator.products}
+    return counts if operator.coupled is None else counts | {"cycles": operator.coupled.cycles}
 
 
 def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> Solution:
@@ -215,8 +224,14 @@ class _Recorder:
         self.clock, self.certified = 0.0, 0.0
         self.repeated = 0
 
-    def _certificate(self) -> float:
-        """The natural-map residual; where products cost iterations, to a digit as long as it is far from the tolerance."""
+    def _certificate(self, known: Sequence[Moved]) -> float:
+        """The natural-map residual, by Q r from the method where it is known.
+
+        Where products cost iterations it is computed to a digit as long as it is far from the tolerance.
+        """
+        if known:
+            moved = replace(known[0], value=known[0].value * self.scales.length)
+            return natural_map_residual(self.problem, self.reactions, self.multipliers, moved=moved)
         rough = loosened(self.problem.Q, ROUGH)
         if rough is not self.problem.Q:
             residual = natural_map_residual(replace(self.problem, Q=rough), self.reactions, self.multipliers)
@@ -224,11 +239,12 @@ class _Recorder:
                 return residual
         return natural_map_residual(self.problem, self.reactions, self.multipliers)
 
-    def record(self, r: np.ndarray, lam: np.ndarray, counts: dict[str, float]) -> Status | None:
+    def record(self, iterate: Iterate | Known, counts: dict[str, float]) -> Status | None:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
+        r, lam, *known = iterate
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)
         begin = time.perf_counter()
-        self.residual = self._certificate()
+        self.residual = self._certificate(known)
         self.certified += time.perf_counter() - begin
         change = _relative(self.reactions[:, 1:], self.previous[:, 1:])
         self.previous = self.reactions

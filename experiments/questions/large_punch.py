@@ -1,4 +1,4 @@
-"""How does the implicit path with multigrid bodies grow, up to a punch of a million unknowns in 3D?"""
+"""What does friction cost beside one linear solve, up to a punch of a million unknowns in 3D?"""
 
 from __future__ import annotations
 
@@ -7,74 +7,139 @@ import resource
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from contactopt import scenes
-from contactopt.analysis.solve_scene import Options
-from contactopt.analysis.zone import solve_zone
+from contactopt import scenes, solve
 from contactopt.figures.plots import BLUE, GREY, ORANGE
+from contactopt.interface.reduction import reduce_bodies
+from contactopt.problem.laws.coulomb import Coulomb
 from experiments.report import merged, write
 
-SIZES = (32, 48, 64, 92)  # elements across the half-width of the punch
+SIZES = (20, 32, 48, 64, 92)  # elements across the half-width of the punch
+FRICTION = (0.1, 0.2, 0.3, 0.4, 0.5)
+COMPARED = (20, 32)  # sizes at which all friction coefficients and the products with Q are tried as well
+ACCURACY = 1e-8  # of the product whose V-cycles are counted
+WAYS = {"coupled": "coupled", "products": "krylov"}  # -> Newton's linear solver
+KEYS = ("elements", "way", "mu")
 
 
-def once(elements: int) -> dict[str, object]:
-    """punch-3d, bodies by multigrid, from nested meshes; run in a process of its own."""
-    wall, cpu = time.perf_counter(), time.process_time()
-    solved = solve_zone(scenes.flat_punch(3, elements=elements), options=Options(solver="multigrid"))
-    reduction, solution = solved.reduction, solved.solution
-    seconds = {"wall [s]": time.perf_counter() - wall, "CPU [s]": time.process_time() - cpu}
-    phases = {f"{name} [s]": value for name, value in solution.seconds.items()}
+def once(elements: int, way: str, mu: float) -> dict[str, object]:
+    """punch-3d from cold, bodies by multigrid; run in a process of its own."""
+    begin = time.perf_counter(), time.process_time()
+    reduction = reduce_bodies(scenes.flat_punch(3), elements, solver="multigrid")
+    made = time.perf_counter(), time.process_time()
+    problem = replace(reduction.problem, law=Coulomb(mu))
+    solution = solve(problem, "newton", linear=WAYS[way])
+    done = time.perf_counter(), time.process_time()
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    cycles = 2 * int(solution.history[-1]["cycles"])
+    of_product = cycles_of_product(reduction)
+    product = time.process_time() - done[1]
     return {
         "elements": elements,
+        "way": way,
+        "mu": mu,
         "unknowns": reduction.dofs,
         "contacts": reduction.problem.contacts,
         "status": solution.status.label,
         "residual": float(solution.residual),
         "steps": solution.iterations,
+        "V-cycles": cycles,  # none of those inside products
         "products": solution.products,
-        **seconds,
-        "peak memory [GiB]": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20,
-        **phases,
+        "V-cycles of one product": of_product,
+        "CPU of one product [s]": product,
+        "set-up CPU [s]": made[1] - begin[1],
+        "set-up wall [s]": made[0] - begin[0],
+        "CPU [s]": done[1] - begin[1],
+        "wall [s]": done[0] - begin[0],
+        "peak memory [GiB]": memory,
     }
 
 
-def isolated(elements: int) -> dict[str, object]:
-    command = [sys.executable, "-m", "experiments.questions.large_punch", "--once", str(elements)]
+def cycles_of_product(reduction) -> int:  # type: ignore[no-untyped-def]
+    """V-cycles of both bodies for one product with Q at ACCURACY, on random forces."""
+    from contactopt.bodies.solvers.multigrid import conjugate_gradients
+
+    r = np.random.default_rng(0).normal(size=reduction.problem.q.size)
+    total = 0
+    for body, B in zip(reduction.bodies, reduction.maps):
+        solver = body.solver
+        total += conjugate_gradients(solver.A, solver.cycle, (B.T @ r)[body.body.free], ACCURACY).cycles
+    return total
+
+
+def isolated(elements: int, way: str, mu: float) -> dict[str, object]:
+    command = [sys.executable, "-m", "experiments.questions.large_punch", "--once", str(elements), way, str(mu)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return dict(json.loads(done.stdout.splitlines()[-1]))
+
+
+def runs(sizes: list[int]) -> list[tuple[int, str, float]]:
+    """All sizes with the largest friction; at those COMPARED all coefficients, and products with Q."""
+    chosen = [(n, "coupled", FRICTION[-1]) for n in sizes]
+    more = [n for n in sizes if n in COMPARED]
+    chosen += [(n, "coupled", mu) for n in more for mu in FRICTION[:-1]]
+    return chosen + [(n, "products", mu) for n in more for mu in (0.3, 0.5)]
 
 
 def draw(rows: list[dict]) -> Figure:
     figure = Figure(figsize=(6.5, 4.2), layout="constrained")
     ax = figure.subplots()
-    n = np.array([row["unknowns"] for row in rows], dtype=float)
-    for key, colour in (("wall [s]", ORANGE), ("CPU [s]", BLUE)):
-        ax.loglog(n, [row[key] for row in rows], "o-", color=colour, mfc="white", label=key)
-    ax.loglog(n, rows[0]["CPU [s]"] * (n / n[0]) ** 1.2, ":", color=GREY, label="n^1.2")
-    ax.set(xlabel="displacement unknowns n [-]", ylabel="scene reduced and solved [s]")
+    for way, colour in (("coupled", ORANGE), ("products", BLUE)):
+        mine = [row for row in rows if row["way"] == way and float(row["mu"]) == FRICTION[-1]]
+        n, cpu = (np.array([float(row[key]) for row in mine]) for key in ("unknowns", "CPU [s]"))
+        ax.loglog(n, cpu, "o-", color=colour, mfc="white", label=way)
+        if way == "coupled":
+            ax.loglog(n, cpu[0] * n / n[0], ":", color=GREY, label="n")
+    ax.set(xlabel="displacement unknowns n [-]", ylabel="CPU, set-up included [s]")
     ax.legend(frameon=False)
     return figure
 
 
-TEXT = """punch-3d, mu = .5, to a certificate of 1e-8: both bodies by conjugate gradients and multigrid, Q by its products,
-`elements` across the half-width of the punch; Newton's method started from the solution on meshes half as fine (itself started from a coarser one; `coarse`).
-CPU time is that of both threads; where it is far below twice the wall time other programs had a share of the two cores.
+TEXT = """punch-3d from cold, to a certificate of 1e-8, both bodies by multigrid, `elements` across the half-width of the punch.
+Ways: `coupled` is Newton's method on displacements and contact forces at once; `products` is Newton's method by products with
+Q, each of which solves with both bodies. V-cycles are those of both bodies together, without those inside products. Every run
+has a process of its own with one BLAS thread; memory is its peak. Set-up is the assembly and the hierarchies. Other programs had
+a share of the two cores, so CPU times are to be compared, not wall times.
 
 {sizes}
 
-Growth of CPU time with the unknowns: exponent {slope}; of wall time: {slope_wall} (least squares over all sizes).
+Growth of the CPU time of `coupled` with the unknowns: exponent {slope} (least squares over all sizes at mu = .5).
+CPU time of the frictional problem over that of one linear solve with both bodies (a product with Q at 1e-8), set-up included in
+both, at mu = .5: {ratios}.
+V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to {most}, over all sizes and mu.
+CPU time of `products` over that of `coupled`, set-up included: {faster}.
 """
+
+
+def report(rows: list[dict]) -> str:
+    coupled = [row for row in rows if row["way"] == "coupled"]
+    largest = [row for row in coupled if float(row["mu"]) == FRICTION[-1]]
+    n, cpu = (np.log([float(row[key]) for row in largest]) for key in ("unknowns", "CPU [s]"))
+    slope = np.polyfit(n, cpu, 1)[0] if len(n) > 1 else np.nan
+    linear = [
+        float(row["CPU [s]"]) / (float(row["set-up CPU [s]"]) + float(row["CPU of one product [s]"])) for row in largest
+    ]
+    ratios = ", ".join(f"{value:.2f} ({int(row['unknowns']):,} unknowns)" for value, row in zip(linear, largest))
+    over = [float(row["V-cycles"]) / float(row["V-cycles of one product"]) for row in coupled]
+    same = {(row["elements"], row["mu"]): float(row["CPU [s]"]) for row in coupled}
+    slow = [row for row in rows if row["way"] == "products"]
+    faster = ", ".join(
+        f"{float(row['CPU [s]']) / same[row['elements'], row['mu']]:.1f} ({int(row['unknowns']):,} unknowns, mu = {row['mu']})"
+        for row in slow
+    )
+    text = TEXT.replace("{slope}", f"{slope:.2f}").replace("{ratios}", ratios).replace("{faster}", faster)
+    return text.replace("{least}", f"{min(over):.1f}").replace("{most}", f"{max(over):.1f}")
+
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--once"]:
-        print(json.dumps(once(int(sys.argv[2]))))
+        print(json.dumps(once(int(sys.argv[2]), sys.argv[3], float(sys.argv[4]))))
     else:
-        rows = [isolated(int(elements)) for elements in sys.argv[1:] or SIZES]
-        rows = sorted(merged("large_punch", "sizes", rows, ("elements",)), key=lambda row: row["unknowns"])
-        n = np.log([row["unknowns"] for row in rows])
-        slopes = {key: np.polyfit(n, np.log([row[key] for row in rows]), 1)[0] for key in ("CPU [s]", "wall [s]")}
-        text = TEXT.replace("{slope}", f"{slopes['CPU [s]']:.2f}").replace("{slope_wall}", f"{slopes['wall [s]']:.2f}")
-        write("large_punch", "A million unknowns", text, {"sizes": rows}, {"growth": draw(rows)})
+        rows = [isolated(*run) for run in runs([int(size) for size in sys.argv[1:]] or list(SIZES))]
+        rows = merged("large_punch", "sizes", rows, KEYS)
+        rows = sorted(rows, key=lambda row: (int(row["unknowns"]), row["way"], float(row["mu"])))
+        write("large_punch", "Friction beside one linear solve", report(rows), {"sizes": rows}, {"growth": draw(rows)})

@@ -25,6 +25,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST, NEAR, RTOL
 from contactopt.bodies.solvers.products import SparseProduct
 from contactopt.bodies.solvers.system import (
+    Iteration,
     Product,
     System,
     asked,
@@ -60,6 +61,10 @@ class MultigridSolver:
     @property
     def complete(self) -> bool:
         return self.last is not None
+
+    @property
+    def iteration(self) -> Iteration:
+        return Iteration(self.A.__matmul__, self.cycle.apply)
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         rtol = RTOL if rtol is None else rtol

@@ -25,6 +25,7 @@ class PardisoSolver:
 
     name = "pardiso"
     iterative = False
+    iteration = None
     releases_lock = True
 
     def __init__(self, system: System):

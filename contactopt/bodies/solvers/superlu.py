@@ -59,6 +59,7 @@ class SuperLUSolver:
 
     name = "superlu"
     iterative = False
+    iteration = None
     releases_lock = False
 
     def __init__(self, system: System):

@@ -31,6 +31,17 @@ class System(NamedTuple):
 Product = Callable[[np.ndarray, float | None], np.ndarray]
 
 
+class Iteration(NamedTuple):
+    """What an iterative solver repeats.
+
+    stiffness  x (n,) -> A x
+    cycle      f (n,) -> B f, symmetric positive definite and close to A^-1 f
+    """
+
+    stiffness: Callable[[np.ndarray], np.ndarray]
+    cycle: Callable[[np.ndarray], np.ndarray]
+
+
 class BodySolver(Protocol):
     """Solves A x = b. Several solvers may work at the same time in different threads.
 
@@ -39,6 +50,7 @@ class BodySolver(Protocol):
     releases_lock  whether a solve leaves Python's lock to other threads, so that two solvers at once are faster than
                    one after the other
     complete       whether the block of the inverse on System.last was provided for
+    iteration      what it repeats, for those who iterate on several bodies at once; None for a solver with factors
     """
 
     name: str
@@ -47,6 +59,9 @@ class BodySolver(Protocol):
 
     @property
     def complete(self) -> bool: ...
+
+    @property
+    def iteration(self) -> Iteration | None: ...
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         """Solution of A x = load.

@@ -6,6 +6,7 @@ r = P(r - rho (Q r + V lambda + q)),  V' r + s = 0,  P the map of the law (conta
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import scipy.linalg as la
@@ -139,11 +140,10 @@ def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
     bodies Newton's method cycles from there, because it takes contacts for sliding before friction acts.
     """
     zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
-    glued = (problem.law.lowest < 0) | (len(problem.s) > 0) | (problem.q[:, 0] < 0)
+    glued = glued_contacts(problem)
     if not glued.any():
         return zero
-    D = np.where(glued[:, None, None], np.eye(problem.dim), 0.0)
-    glue = Equations(problem.Q, problem.q, problem.V, problem.s, lambda y: (np.where(glued[:, None], y, 0.0), D))
+    glue = replace(glued_projection(coulomb_equations(problem), glued), rho=np.ones(problem.contacts))
     _, error, balance, D = glue.evaluate(*zero)
     make = sparse if sp.issparse(problem.Q) else dense
     bonded = (step or make(problem)[1])(glue, error, balance, D, FIRST)
@@ -151,3 +151,14 @@ def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
         return bonded or zero
     equations = coulomb_equations(problem)
     return min(zero, bonded, key=lambda point: equations.evaluate(*point)[0])
+
+
+def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
+    """Mask (k,) of the contacts that the bonded solution glues: all if a plate presses, else those that would penetrate."""
+    return np.asarray((problem.law.lowest < 0) | (len(problem.s) > 0) | (problem.q[:, 0] < 0))
+
+
+def glued_projection(equations: Equations, glued: np.ndarray) -> Equations:
+    """The equations in which the contacts of the mask (k,) are glued and the others carry no force."""
+    D = np.where(glued[:, None, None], np.eye(equations.q.shape[1]), 0.0)
+    return replace(equations, project=lambda y: (np.where(glued[:, None], y, 0.0), D))

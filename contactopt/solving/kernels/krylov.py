@@ -14,15 +14,15 @@ preconditioned system is that well conditioned whatever sticks, slips or is open
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import LinearOperator, cg, gmres
+from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import loosened
+from contactopt.solving.kernels.linearised import CYCLES, RESTART, Linearised
 from contactopt.solving.kernels.semismooth import Equations
 from contactopt.solving.notes import note
 from contactopt.solving.preconditioners import Preconditioner, deflated, preconditioner, restricted, smooth_motions
@@ -30,30 +30,31 @@ from contactopt.solving.preconditioners import Preconditioner, deflated, precond
 logger = logging.getLogger(__name__)
 
 FLAT = 1e-8  # eigenvalues of D below this are zero
-RESTART, CYCLES = 60, 3  # of GMRES
 PRODUCTS = 0.05  # accuracy of products, over that of the step
 INNER = 1e-3  # and of the model's GMRES, which costs next to nothing
 MODEL = 1e-4  # accuracy of the products that make the model
-SLIPPING = 0.5  # diagonal entries of D below this count as zero where only a rough inverse is asked for
 
 Step = tuple[np.ndarray, np.ndarray]  # dr (k, d), dlambda (p,)
 
 
-def model_of(problem: InterfaceProblem, name: str | None = None) -> Preconditioner:
-    """The preconditioner of that name with the smooth motions deflated; 'none': the identity.
+def model_of(problem: InterfaceProblem, name: str | None = None, deflate: bool = True) -> Preconditioner:
+    """The preconditioner of that name, with the smooth motions deflated if asked for; 'none': the identity.
 
-    None: `neumann` where the contacts lie on a grid, else the identity, with a note that says why.
+    None: `neumann` where the contacts lie on a grid, `laplacian` on other surfaces whose cells are known, else the identity,
+    with a note that says why.
     """
-    n = problem.q.size
-    if name != "none":
+    missing: list[str] = []
+    for choice in ("neumann", "laplacian") if name is None else (name,) * (name != "none"):
         try:
-            P, Q = preconditioner(problem, name or "neumann"), loosened(problem.Q, MODEL)
-            return deflated(P, Q, smooth_motions(problem))
+            P = preconditioner(problem, choice)
+            return deflated(P, loosened(problem.Q, MODEL), smooth_motions(problem)) if deflate else P
         except InputError as error:
             if name is not None:
                 raise
-            note(logger, f"no preconditioner fits these contacts, so iterative steps go without one: {error}")
-    return Preconditioner(n, lambda x: x)
+            missing.append(str(error))
+    if missing:
+        note(logger, f"no preconditioner fits these contacts, so iterative steps go without one: {' '.join(missing)}")
+    return Preconditioner(problem.q.size, lambda x: x)
 
 
 def krylov_step(
@@ -130,69 +131,7 @@ def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarr
 def _unsymmetric_step(
     equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
 ) -> Step:
-    (k, d), p = error.shape, len(balance)
-    closed = np.flatnonzero(np.repeat(np.any(D != 0, axis=(1, 2)), d))
-    n = len(closed)
-    rho, V = equations.rho[:, None], equations.V
-    Q = loosened(equations.Q, PRODUCTS * rtol)
-    known = error.ravel().copy()
-    known[closed] = 0.0
-
-    def system(product: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
-        def act(x: np.ndarray) -> np.ndarray:
-            dr = np.zeros(k * d)
-            dr[closed] = x[:n]
-            moved = product(dr) + V @ x[n:]
-            return np.concatenate([_rows(dr, moved)[closed], V.T @ dr])
-
-        return act
-
-    def _rows(dr: np.ndarray, moved: np.ndarray) -> np.ndarray:
-        inner = dr.reshape(k, d) - rho * (moved.reshape(k, d) + equations.weight * dr.reshape(k, d))
-        return (dr.reshape(k, d) - np.einsum("kab,kb->ka", D, inner)).ravel()
-
-    right = np.concatenate([error.ravel()[closed], -balance - V.T @ known])
-    if np.any(known):
-        right[:n] -= _rows(known, Q @ known)[closed]
-    rough = _rough_inverse(P, closed, D, np.repeat(equations.rho, d)[closed], V[closed])
-    inverse = rough
-    if P.model is not None:
-        model = LinearOperator((n + p, n + p), matvec=system(lambda x: P.model @ x), dtype=float)
-        inverse = LinearOperator(
-            (n + p, n + p), matvec=lambda x: _gmres(model, x.ravel(), INNER * rtol, rough)[0], dtype=float
-        )
-    full = LinearOperator((n + p, n + p), matvec=system(lambda x: Q @ x), dtype=float)
-    x = _gmres(full, right, rtol, inverse)[0]
-    known[closed] = x[:n]
-    return known.reshape(k, d), x[n:]
-
-
-def _gmres(A: LinearOperator, b: np.ndarray, rtol: float, M: LinearOperator) -> tuple[np.ndarray, int]:
-    return gmres(A, b, rtol=rtol, restart=min(len(b), RESTART), maxiter=CYCLES, M=M)
-
-
-def _rough_inverse(
-    P: Preconditioner, closed: np.ndarray, D: np.ndarray, rho: np.ndarray, V: np.ndarray
-) -> LinearOperator:
-    """P where a component is held by contact, the identity where it slips, bordered by the balance."""
-    n, p = V.shape
-    inside = np.diagonal(D, axis1=1, axis2=2).ravel()[closed] > SLIPPING
-    unknowns = closed[inside]
-
-    def apply(x: np.ndarray) -> np.ndarray:
-        y = x.copy()
-        full = np.zeros(P.shape[0])
-        full[unknowns] = x[inside] / rho[inside]
-        y[inside] = (P @ full)[unknowns]
-        return y
-
-    border = rho[:, None] * V * inside[:, None]
-    Y = np.stack([apply(v) for v in border.T], axis=1) if p else V
-    K = np.linalg.pinv(V.T @ Y)
-
-    def solve(x: np.ndarray) -> np.ndarray:
-        y = apply(x[:n])
-        multipliers = K @ (V.T @ y - x[n:])
-        return np.concatenate([y - Y @ multipliers, multipliers])
-
-    return LinearOperator((n + p, n + p), matvec=lambda x: solve(x.ravel()), dtype=float)
+    Q, linearised = loosened(equations.Q, PRODUCTS * rtol), Linearised(equations, D)
+    inverse = linearised.inverse(P, INNER * rtol)
+    dr, multipliers = linearised.solve(lambda x: Q @ x, inverse, error.ravel(), balance, rtol)
+    return dr.reshape(error.shape), multipliers

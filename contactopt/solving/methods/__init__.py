@@ -2,7 +2,8 @@
 
 A method is a frozen dataclass whose fields are its settings. `iterate(problem, start)` takes a dimensionless
 InterfaceProblem and yields (reactions (k, dim), multipliers (p,)) after each outer iteration, from a cold start if
-`start` is None; the driver (contactopt.solve) owns the clock, the stopping rule, the history and the limits. A method
+`start` is None. A method that knows Q r of an iterate to a stated accuracy yields it as well, as a Moved, which saves
+the driver a product. The driver (contactopt.solve) owns the clock, the stopping rule, the history and the limits. A method
 that ends by itself has met its own criterion or cannot go on.
 
 Two statements are optional. `implicit = True` says that it takes a Q that is known by its products only. `solves(law)` says
@@ -20,12 +21,14 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Law
+from contactopt.problem.certificate import Moved
 
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
+Known = tuple[np.ndarray, np.ndarray, Moved]  # the same, and Q r
 
 
 class Method(Protocol):
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]: ...
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]: ...
 
     def backends(self, dim: int) -> tuple[str, str]:
         """Names of its normal and tangential backend in `dim` dimensions, NATIVE where it needs none.

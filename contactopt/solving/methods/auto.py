@@ -33,7 +33,7 @@ from contactopt.problem.operators import InterfaceOperator
 from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations, definite
 from contactopt.solving.kernels.interior import interior_iterates
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
-from contactopt.solving.methods import NATIVE, Iterate
+from contactopt.solving.methods import NATIVE, Iterate, Known
 from contactopt.solving.methods.cone import AcaryCadoux
 from contactopt.solving.methods.nested import Nested
 from contactopt.solving.methods.newton import Newton
@@ -71,7 +71,7 @@ class Auto:
     def backends(self, dim: int) -> tuple[str, str]:
         return NATIVE, NATIVE
 
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]:
         if sp.issparse(problem.Q) and not (problem.symmetric and definite(problem.Q)):
             reached = start or (np.zeros(problem.q.shape), np.zeros(len(problem.s)))
         else:
@@ -124,7 +124,7 @@ class Auto:
     @staticmethod
     def _newton(
         problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
-    ) -> Generator[Iterate, None, Iterate]:
+    ) -> Generator[Iterate | Known, None, Iterate]:
         """Newton's iterates; returns the best. What comes next needs the entries of Q: not before they cost no more."""
         best, reached, since = np.inf, start, 0
         operator = problem.Q if isinstance(problem.Q, InterfaceOperator) else None
@@ -132,7 +132,7 @@ class Auto:
             yield point
             since = 0 if residual < PROGRESS * best else since + 1
             if residual < best:
-                best, reached = residual, point
+                best, reached = residual, point[:2]
             tired = since >= PATIENCE or steps >= LIMIT
             if tired and (operator is None or operator.products >= problem.q.size):
                 break

@@ -3,7 +3,9 @@
 Solves r = P(r - rho (Q r + V lambda + q)), V' r + s = 0 with P the map of the law (contactopt.problem.laws): each step
 sorts the contacts into open, sticking and slipping and solves one linear system of the closed ones: dense, n^3/3 to
 2 n^3/3 operations, by sparse factors where Q is sparse, or, where Q is an operator, by PCG and GMRES to the accuracy that
-the step is worth (Eisenstat, Walker 1996), some ten products with Q each (contactopt.solving.kernels.krylov). Full steps from the bonded solution; the number of steps hardly depends on the mesh
+the step is worth (Eisenstat, Walker 1996), some ten products with Q each (contactopt.solving.kernels.krylov). Where the
+bodies themselves are solved by iteration, one iteration sees contacts and bodies at once
+(contactopt.solving.kernels.coupled). Full steps from the bonded solution; the number of steps hardly depends on the mesh
 (reports/newton_steps). Not globally convergent: rank-deficient Q (rigid bodies, redundant contacts) or strong
 friction may make it cycle, which is what `proximal` is for.
 Sources: Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm for
@@ -32,20 +34,23 @@ from contactopt.solving.kernels.alart_curnier import (
     krylov,
     sparse,
 )
-from contactopt.solving.methods import NATIVE, Iterate
+from contactopt.solving.kernels.coupled import coupled_steps
+from contactopt.solving.methods import NATIVE, Iterate, Known
 from contactopt.solving.notes import note
 from contactopt.solving.preconditioners import find_preconditioner
 
 logger = logging.getLogger(__name__)
 
+UNSOLVED = "Newton's method ended because the linear system of a step could not be solved"
 SHARP = 1e-4  # accuracy of a residual, over the residual that the step aimed at
 
 
 @dataclass(frozen=True)
 class Newton:
-    """linear: 'dense' or 'krylov', which needs products with Q only; None: as Q is an array or an operator.
+    """linear: 'dense', 'krylov', which needs products with Q only, or 'coupled', which iterates on the bodies at once.
 
-    preconditioner of krylov: a name (see contactopt.solving.preconditioners) or 'none'; None: the best that fits the contacts.
+    None: dense for an array Q, coupled where the bodies are solved by iteration, krylov for other operators.
+    preconditioner of the last two: a name (see contactopt.solving.preconditioners) or 'none'; None: the best that fits the contacts.
     """
 
     linear: str | None = None
@@ -55,19 +60,26 @@ class Newton:
     unsymmetric: ClassVar[bool] = True  # and one that is not symmetric
 
     def __post_init__(self) -> None:
-        if self.linear not in (None, "dense", "krylov"):
-            raise InputError(f"unknown linear solver {self.linear!r}; choose dense or krylov.")
+        if self.linear not in (None, "dense", "krylov", "coupled"):
+            raise InputError(f"unknown linear solver {self.linear!r}; choose dense, krylov or coupled.")
         find_preconditioner(self.preconditioner)
 
     def backends(self, dim: int) -> tuple[str, str]:
         return NATIVE, NATIVE
 
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]:
         for point, _ in self.steps(problem, start):
             yield point
 
-    def steps(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[tuple[Iterate, float]]:
+    def steps(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[tuple[Iterate | Known, float]]:
         """Iterates with the residual of the equations that each step began with."""
+        form = problem.Q.coupled if isinstance(problem.Q, InterfaceOperator) else None
+        if self.linear == "coupled" and form is None:
+            raise InputError("linear='coupled' needs bodies that are solved by iteration; take the solver 'multigrid'.")
+        if form is not None and self.linear in (None, "coupled"):
+            yield from coupled_steps(problem, form, self.preconditioner, start)
+            note(logger, UNSOLVED)
+            return
         implicit = self.linear == "krylov" or (self.linear is None and isinstance(problem.Q, InterfaceOperator))
         if self.linear == "dense" or (isinstance(problem.Q, InterfaceOperator) and not implicit):
             problem = problem.explicit()
@@ -87,6 +99,6 @@ class Newton:
             rtol = forcing(residual, last)
             change = step(sharp, error, balance, D, rtol)
             if change is None:
-                note(logger, "Newton's method ended because the linear system of a step could not be solved")
+                note(logger, UNSOLVED)
                 return
             r, multipliers, last = r + change[0], multipliers + change[1], residual

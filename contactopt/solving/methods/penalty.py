@@ -53,7 +53,7 @@ class Penalty:
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         softened = self.regularised(problem)
         loosest = max(self.factor, self.tangential_factor or 0.0)
-        for r, multipliers in Auto().iterate(softened, start):
+        for r, multipliers, *_ in Auto().iterate(softened, start):
             yield r, multipliers
             if natural_map_residual(softened, r, multipliers) <= max(EXACT / loosest, 1e-13):
                 return

@@ -33,7 +33,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, part_of
 from contactopt.problem.operators import Interface, diagonal, held
-from contactopt.solving.preconditioners.grid import GridMap, grid_of
+from contactopt.solving.preconditioners.grid import GridMap
 
 ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an active set
 
@@ -53,7 +53,8 @@ class Preconditioner(LinearOperator):
         return self._matvec(x)
 
 
-# name -> (module, function of the grid of contacts giving P and, where it is cheap, P^-1, what it is)
+# name -> (module, function (problem, mask (k, dim) of what cannot move) giving products (k, dim) -> (k, dim) with P and, where
+# it is cheap, P^-1, for a Q of mean diagonal one, what it is)
 PRECONDITIONERS = {
     "p21": (
         "contactopt.solving.preconditioners.circulant",
@@ -69,6 +70,11 @@ PRECONDITIONERS = {
         "contactopt.solving.preconditioners.neumann",
         "neumann",
         "square root of the Neumann Laplacian, by the cosine transform",
+    ),
+    "laplacian": (
+        "contactopt.solving.preconditioners.surface",
+        "laplacian",
+        "square root of the Neumann Laplacian on any contact mesh, by sparse factors",
     ),
 }
 
@@ -103,26 +109,18 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
         return _blocks(problem, [preconditioner(part_of(problem, pair), name) for pair in problem.pairs])
     is_held = held(problem.Q)
     mean = float(np.mean(diagonal(problem.Q)[~is_held])) if not is_held.all() else 1.0
-    grid, order = grid_of(problem, is_held.reshape(problem.q.shape))
     module, function, _ = PRECONDITIONERS[name]
-    product, inverse = getattr(import_module(module), function)(grid)
+    product, inverse = getattr(import_module(module), function)(problem, is_held.reshape(problem.q.shape))
 
-    def on_grid(act: GridMap, factor: float) -> GridMap:
+    def beside(act: GridMap, factor: float) -> GridMap:
         def apply(x: np.ndarray) -> np.ndarray:
-            sorted_ = np.where(is_held, 0.0, x).reshape(problem.q.shape)[order]
-            if grid.turn is not None:
-                sorted_[:, 1:] = sorted_[:, 1:] @ grid.turn.T
-            made = act(sorted_.reshape(*grid.shape, problem.dim)).reshape(problem.q.shape)
-            if grid.turn is not None:
-                made[:, 1:] = made[:, 1:] @ grid.turn
-            out = np.empty(problem.q.shape)
-            out[order] = made
-            return np.where(is_held, x, factor * out.ravel())  # what cannot move is on its own
+            made = act(np.where(is_held, 0.0, x).reshape(problem.q.shape))
+            return np.where(is_held, x, factor * made.ravel())  # what cannot move is on its own
 
         return apply
 
-    model = None if inverse is None else on_grid(inverse, mean)
-    return Preconditioner(problem.q.size, on_grid(product, 1 / mean), model)
+    model = None if inverse is None else beside(inverse, mean)
+    return Preconditioner(problem.q.size, beside(product, 1 / mean), model)
 
 
 def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Preconditioner:

@@ -7,7 +7,8 @@ from scipy.fft import fft, ifft, irfft, rfft
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt.errors import InputError
-from contactopt.solving.preconditioners.grid import Grid, GridMap
+from contactopt.problem import InterfaceProblem
+from contactopt.solving.preconditioners.grid import Grid, GridMap, GridMaps, on_grid
 
 INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
 
@@ -33,7 +34,17 @@ def norm(m: float, h: float) -> np.ndarray:
     return column
 
 
-def p21(grid: Grid) -> tuple[GridMap, None]:
+def p21(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
+    """P21 of eq (25) or, in 3D, P31 of eq (29) on the grid of the contacts; `still` (k, dim) masks what cannot move."""
+    return on_grid(problem, still, extended)
+
+
+def p22(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
+    """P22 of eq (26) on the contact line; `still` (k, dim) masks what cannot move."""
+    return on_grid(problem, still, inverse_of_extended)
+
+
+def extended(grid: Grid) -> tuple[GridMap, None]:
     """P21 = E' Q_c E of eq (25) on a line; on a rectangle its sum along both directions, P31 of eq (29).
 
     Parameters
@@ -51,7 +62,7 @@ def p21(grid: Grid) -> tuple[GridMap, None]:
     return lambda X: np.sum([line(X) for line in lines], axis=0), None
 
 
-def p22(grid: Grid) -> tuple[GridMap, GridMap]:
+def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
     """P22 = (E' L_c^-1 Q_c E)^-1 of eq (26), a Toeplitz system solved by conjugate gradients.
 
     The spacing h of eq (28) is measured in quarters of the contact line's length, so that units do not matter.
@@ -77,7 +88,7 @@ def p22(grid: Grid) -> tuple[GridMap, GridMap]:
         return circular(1 / symbol), circular(symbol)
     m = closed_curve(k)
     symbol = rfft(seminorm(m)).real / rfft(norm(m, 4 / (k - 1))).real
-    product, guess = restricted_circulant(symbol, k, 0), p21(grid)[0]
+    product, guess = restricted_circulant(symbol, k, 0), extended(grid)[0]
     toeplitz = LinearOperator((k, k), matvec=lambda x: product(x.reshape(k, 1))[:, 0], dtype=float)
     near = LinearOperator((k, k), matvec=lambda x: guess(x.reshape(k, 1))[:, 0], dtype=float)
 

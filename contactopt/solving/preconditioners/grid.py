@@ -14,6 +14,7 @@ from contactopt.problem.operators import nodal_weights
 from contactopt.solving.preconditioners.constants import CELL, EDGE
 
 GridMap = Callable[[np.ndarray], np.ndarray]  # linear map of arrays (*shape, dim)
+GridMaps = tuple[GridMap, GridMap | None]  # products with P and, where it is cheap, with P^-1
 EVEN = 1e-6  # relative difference of spacings that counts as none
 
 
@@ -86,6 +87,28 @@ def grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarr
     weights = cells**CELL * (areas * cells.sum() / areas.sum() / cells) ** EDGE
     weights /= np.sqrt(np.mean(weights**2))
     return Grid(tuple(ticks), np.moveaxis(np.array(ends), 2, 0), weights, turn=turn if oblique else None), order
+
+
+def on_grid(problem: InterfaceProblem, still: np.ndarray, make: Callable[[Grid], GridMaps]) -> GridMaps:
+    """Products on arrays (k, dim) from those on the grid of the contacts (*shape, dim), which `make` gives."""
+    grid, order = grid_of(problem, still)
+    product, inverse = make(grid)
+
+    def placed(act: GridMap) -> GridMap:
+        def apply(x: np.ndarray) -> np.ndarray:
+            x = x[order]
+            if grid.turn is not None:
+                x[:, 1:] = x[:, 1:] @ grid.turn.T
+            made = act(x.reshape(*grid.shape, problem.dim)).reshape(x.shape)
+            if grid.turn is not None:
+                made[:, 1:] = made[:, 1:] @ grid.turn
+            out = np.empty(x.shape)
+            out[order] = made
+            return out
+
+        return apply
+
+    return placed(product), None if inverse is None else placed(inverse)
 
 
 def _line(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:

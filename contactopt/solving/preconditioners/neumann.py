@@ -16,8 +16,9 @@ import numpy as np
 import scipy.linalg as la
 from scipy.fft import dct, dst, fft, idct, idst
 
+from contactopt.problem import InterfaceProblem
 from contactopt.solving.preconditioners.constants import SOFT, SPLIT
-from contactopt.solving.preconditioners.grid import EVEN, Grid, GridMap, cells_along
+from contactopt.solving.preconditioners.grid import EVEN, Grid, GridMap, GridMaps, cells_along, on_grid
 
 # held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j + shift) / k
 TRANSFORMS = {
@@ -78,7 +79,12 @@ def direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
     return Direction(waves, np.maximum(values, 0.0), along(vectors.T), along(vectors))
 
 
-def neumann(grid: Grid) -> tuple[GridMap, GridMap]:
+def neumann(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
+    """The root on the grid of the contacts, and its inverse; `still` (k, dim) masks what cannot move."""
+    return on_grid(problem, still, root_on_grid)
+
+
+def root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:
     """Square root of the Laplacian of the contacts, weighted by their sizes, and its inverse.
 
     The Laplacian maps constants to zero, which has no inverse. Half the smallest other eigenvalue of the root stands in

@@ -1,0 +1,180 @@
+"""Newton's steps on the contact equations and the equilibrium of the bodies at once: no solve inside a solve.
+
+The unknowns are the displacements X of the bodies, the contact forces r and the multipliers lambda. With Q = T A^-1 T' + R
+(contactopt.problem.coupled) one step of Newton's method on r = P(r - rho (T X + R r + V lambda + q)) is
+
+    A dX - T' dr = T' r - A X
+    (I - D + D rho R) dr + D rho (T dX + V dlambda) = error,   V' dr = -balance.
+
+Flexible GMRES solves it to the accuracy that the step is worth. Its preconditioner is block triangular: the Schur complement
+for a model of Q gives (dr, dlambda), then one V-cycle per body gives dX for the right side T' dr and the rest. The
+displacements are carried from step to step, so that equilibrium becomes as accurate as the contact equations.
+
+Source of the preconditioner: Bramble, Pasciak (1988), A preconditioning technique for indefinite systems; Murphy, Golub,
+Wathen (2000), A note on preconditioning for indefinite linear systems.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.certificate import Moved
+from contactopt.problem.coupled import CoupledForm
+from contactopt.solving.deadline import check_time
+from contactopt.solving.kernels.alart_curnier import coulomb_equations, glued_contacts, glued_projection
+from contactopt.solving.kernels.flexible import flexible_gmres
+from contactopt.solving.kernels.krylov import model_of
+from contactopt.solving.kernels.linearised import Linearised
+from contactopt.solving.kernels.semismooth import Equations
+from contactopt.solving.preconditioners import Preconditioner
+
+FIRST, LOOSEST, TIGHTEST = 0.1, 0.1, 1e-2  # accuracy of a step: the first two, and the bounds of the others
+INNER = 1e-2  # accuracy of the Schur complement of the model
+MARGIN = 1.5  # the model's Schur complement over that of a mean fit
+GIVEN = 1e-3  # accuracy of equilibrium under forces to start from
+MOST = 60  # conjugate gradient iterations towards it
+
+Known = tuple[np.ndarray, np.ndarray, Moved]  # reactions (k, dim), multipliers (p,) and Q r
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Displacements X (N,), contact forces r (k, d) and multipliers (p,)."""
+
+    X: np.ndarray
+    r: np.ndarray
+    multipliers: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Coupled:
+    """The equations of one problem, its form before condensation and a model of Q."""
+
+    equations: Equations
+    form: CoupledForm
+    P: Preconditioner
+
+    @property
+    def weights(self) -> np.ndarray:
+        """(N + k d + p,) weights of the residuals: in units of the root of an energy, whatever the mesh."""
+        r = np.repeat(self.equations.rho**-0.5, self.equations.q.shape[1])
+        return np.concatenate([self.form.diagonal**-0.5, r, np.ones(len(self.equations.s))])
+
+    def linearised(self, at: State) -> tuple[np.ndarray, Linearised]:
+        """The right side (N + k d + p,) of Newton's step there, and its contact equations."""
+        equations = self.equations
+        u = (self.form.moved(at.X, at.r.ravel()) + equations.V @ at.multipliers).reshape(at.r.shape) + equations.q
+        P, D = equations.project(at.r - equations.rho[:, None] * u)
+        balance = equations.V.T @ at.r.ravel() + equations.s
+        forces = self.form.unbalanced(at.X, at.r.ravel())
+        return np.concatenate([forces, (P - at.r).ravel(), -balance]), Linearised(equations, D)
+
+    def size(self, right: np.ndarray) -> float:
+        """The residual that belongs to a right side."""
+        return float(np.linalg.norm(self.weights * right))
+
+    def step(self, at: State, right: np.ndarray, linearised: Linearised, rtol: float) -> State | None:
+        """The state after Newton's step, or None if its linear system could not be solved."""
+        form, V, N, n = self.form, self.equations.V, self.form.size, at.r.size
+        inverse = linearised.inverse(self.P, INNER)
+        model = (lambda x: self.P @ x) if self.P.model is None else self.P.model.matvec
+
+        def product(x: np.ndarray) -> np.ndarray:
+            X, r, multipliers = np.split(x, [N, N + n])
+            moved = form.moved(X, r) + V @ multipliers
+            return np.concatenate([-form.unbalanced(X, r), linearised.rows(r, moved), V.T @ r])
+
+        def precondition(x: np.ndarray) -> np.ndarray:
+            forces, error, balance = np.split(x, [N, N + n])
+            r, multipliers = linearised.solve(model, inverse, error, -balance, INNER)
+            return np.concatenate([form.approximate(forces + form.trace.T @ r), r, multipliers])
+
+        change = flexible_gmres(product, precondition, right, self.weights, rtol)
+        if not np.all(np.isfinite(change)):
+            return None
+        X, r, multipliers = np.split(change, [N, N + n])
+        return State(at.X + X, at.r + r.reshape(at.r.shape), at.multipliers + multipliers)
+
+    def judged(self, at: State, error: np.ndarray) -> Known:
+        """The forces P(y) = r + error, at the solution equal to r and within the bounds to the last digit, with Q P(y).
+
+        One V-cycle improves the displacements. The accuracy stated is that before it, by the criterion with which
+        conjugate gradients end: the energy (f'Bf)^1/2 of the missing forces f over that of the displacements.
+        """
+        form, r = self.form, at.r + error
+        missing = form.unbalanced(at.X, r.ravel())
+        correction = form.approximate(missing)
+        energy = float(at.X @ (form.trace.T @ r.ravel() - missing))
+        lacking = float(missing @ correction)
+        accuracy = np.sqrt(lacking / energy) if energy > 0 else (np.inf if lacking else 0.0)
+        return r, at.multipliers, Moved(form.moved(at.X + correction, r.ravel()), float(accuracy))
+
+
+def coupled_steps(
+    problem: InterfaceProblem,
+    form: CoupledForm,
+    preconditioner: str | None,
+    start: tuple[np.ndarray, np.ndarray] | None,
+) -> Iterator[tuple[Known, float]]:
+    """Newton's iterates with the residual of the equations that each step began with; ends where a step fails."""
+    P = fitted(model_of(problem, preconditioner, deflate=False), form)
+    coupled = Coupled(coulomb_equations(problem), form, P)
+    at = _bonded(problem, coupled) if start is None else State(in_equilibrium(form, start[0]), *start)
+    last = np.inf
+    while at is not None:
+        right, linearised = coupled.linearised(at)
+        residual = coupled.size(right)
+        error = right[form.size : form.size + at.r.size].reshape(at.r.shape)
+        yield coupled.judged(at, error), residual
+        rtol = min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else FIRST
+        at, last = coupled.step(at, right, linearised, rtol), residual
+
+
+def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
+    """The bonded solution of contactopt.solving.kernels.alart_curnier.cold_start, to FIRST, or no force at all."""
+    zero = State(np.zeros(coupled.form.size), np.zeros(problem.q.shape), np.zeros(len(problem.s)))
+    glued = glued_contacts(problem)
+    if not glued.any():
+        return zero
+    glue = Coupled(glued_projection(coupled.equations, glued), coupled.form, coupled.P)
+    right, linearised = glue.linearised(zero)
+    bonded = glue.step(zero, right, linearised, FIRST)
+    if bonded is None or len(problem.s):
+        return bonded or zero
+    return min(zero, bonded, key=lambda state: coupled.size(coupled.linearised(state)[0]))
+
+
+def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
+    """P and its model, scaled so that the eigenvalues of P Q lie about 1 / MARGIN where a random force does most of its work.
+
+    One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur complement that is rather
+    too large than too small.
+    """
+    x = np.random.default_rng(0).normal(size=P.shape[0])
+    Qx = form.moved(form.approximate(np.asarray(form.trace.T @ x)), x)
+    factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / MARGIN, P.model
+    stiff = None if model is None else lambda y: model @ y / factor
+    return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
+
+
+def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN) -> np.ndarray:
+    """Displacements X (N,) close to A^-1 trace' r, by conjugate gradients with V-cycles."""
+    X, residual = np.zeros(form.size), np.asarray(form.trace.T @ r.ravel())
+    p, size, goal = np.zeros(form.size), 1.0, 0.0
+    for step in range(MOST):
+        check_time()
+        z = form.approximate(residual)
+        size, previous = float(np.einsum("i,i", residual, z)), size
+        goal = goal if step else rtol**2 * size
+        if not size > goal:
+            break
+        p = z + (size / previous if step else 0.0) * p
+        Ap = form.stiffness(p)
+        alpha = size / float(np.einsum("i,i", p, Ap))
+        X += alpha * p
+        residual -= alpha * Ap
+    return X

@@ -1,0 +1,157 @@
+"""`laplacian`: the square root of the Laplacian of any contact surface, on the mesh of the contacts itself.
+
+A half-space moves under a traction t by (-Laplace)^-1/2 t. With linear elements on the cells of the contacts, K the stiffness
+of the Laplacian with natural (Neumann) conditions at free edges and M the lumped mass, nodal forces r = M t move the
+contacts by
+
+    G r = M^-1/2 L^-1/2 M^-1/2 r,   L = M^-1/2 K M^-1/2 + shift,   P = M^1/2 L^1/2 M^1/2.
+
+At an edge M is what a contact inside would have, and the share of it that is there enters with the power EDGE, as in
+`neumann`. The shift keeps constants, which a Neumann Laplacian maps to zero; it belongs to each connected piece of the surface.
+Components that cannot move are left out. The inverse root is a rational function whose error falls exponentially with the
+number of its poles: each of them is one sparse factorisation of a matrix of the surface.
+
+Source: Hale, Higham, Trefethen (2008), Computing A^alpha, log(A), and related matrix functions by contour integrals,
+method 3 for the square root.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+from scipy.special import ellipj, ellipk, ellipkm1
+
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem
+from contactopt.solving.preconditioners.constants import EDGE
+
+ACCURACY = 1e-4  # of the rational function
+THINNEST = 1e-2  # nodal area over mass, relative to the mean, of a contact on an axis
+PIECE = 0.25  # shift over the least eigenvalue of a piece of the surface that is as long as this one
+
+Act = Callable[[np.ndarray], np.ndarray]
+Root = tuple[Act, Act]  # products with P and with G = P^-1
+
+
+def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
+    """Products (k, dim) -> (k, dim) with P and with its inverse G, scaled to a mean diagonal of one.
+
+    `still` (k, dim) masks what cannot move. The mean diagonal is an estimate by random signs (Hutchinson 1989).
+
+    Raises
+    ------
+    InputError
+        If the problem does not know the cells of its contact surface.
+    """
+    cells = problem.chart.cells
+    if cells is None:
+        raise InputError(
+            "the preconditioner 'laplacian' needs the cells of the contact surface, which are not known here."
+        )
+    own = len(problem.coordinates) == problem.dim
+    K, mass, shift, share = surface_matrices(problem.coordinates if own else problem.chart.places, cells)
+    # Forces are spread over the nodal areas, which differ from the mass where the surface goes around an axis.
+    depth = problem.areas / mass
+    depth = np.maximum(depth / depth.mean(), THINNEST)
+    patterns, which = np.unique(still, axis=1, return_inverse=True)
+    held = [(pattern, which.ravel() == i) for i, pattern in enumerate(patterns.T) if not pattern.all()]
+    roots = [
+        (~pattern, components, square_root(K, mass, shift, share, depth, ~pattern)) for pattern, components in held
+    ]
+
+    def product(X: np.ndarray, inverse: bool) -> np.ndarray:
+        out = np.zeros(X.shape)
+        for moves, components, root in roots:
+            there = np.ix_(moves, components)
+            out[there] = root[inverse](X[there])
+        return out
+
+    signs = np.where(np.random.default_rng(0).random(still.shape) < 0.5, -1.0, 1.0) * ~still
+    mean = float(np.sum(signs * product(signs, True))) / max(int((~still).sum()), 1) or 1.0
+    return lambda X: mean * product(X, False), lambda X: product(X, True) / mean
+
+
+def surface_matrices(points: np.ndarray, cells: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray, np.ndarray]:
+    """Stiffness K (k, k) of the Laplacian, lumped mass (k,), the shift (k,) of the piece that each contact is on, and the
+    share (k,) of a full turn that the cells of a contact span: a half at a straight edge.
+
+    Parameters
+    ----------
+    points : (d, k) positions [length]
+    cells : (v, c) corners of lines, triangles or quadrilaterals, which stand for the mean of both ways to cut them
+    """
+    k, v = points.shape[1], len(cells)
+    if v == 2 or v == 3:
+        pieces, part = [cells], 1.0
+    else:
+        pieces, part = [cells[list(corners)] for corners in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))], 0.5
+    K, mass, share = sp.csr_matrix((k, k)), np.zeros(k), np.zeros(k)
+    for corners in pieces:
+        gradients, measure = _simplices(points, corners)
+        for i, own in enumerate(corners):
+            np.add.at(mass, own, part * measure / len(corners))
+            np.add.at(share, own, part * _angle(points[:, np.roll(corners, -i, axis=0)]))
+            for j, other in enumerate(corners):
+                entries = part * measure * np.einsum("dc,dc->c", gradients[i], gradients[j])
+                K = K + sp.csr_matrix((entries, (own, other)), (k, k))
+    if np.any(mass <= 0):
+        raise InputError("the cells of the contact surface leave out contacts, so that it has no Laplacian.")
+    piece = connected_components(K, directed=False)[1]
+    lengths = [np.linalg.norm(np.ptp(points[:, piece == i], axis=1)) for i in range(piece.max() + 1)]
+    # The least eigenvalue of a convex surface is at least (pi / diameter)^2 (Payne, Weinberger 1960).
+    return K, mass, PIECE * (np.pi / np.array(lengths)[piece]) ** 2, np.minimum(share, 1.0)
+
+
+def _angle(x: np.ndarray) -> np.ndarray:
+    """Share (c,) of a full turn at the first corner of lines or triangles x (d, v, c); a line is half of what meets there."""
+    if x.shape[1] == 2:
+        return np.full(x.shape[2], 0.5)
+    a, b = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+    cosine = np.sum(a * b, axis=0) / (np.linalg.norm(a, axis=0) * np.linalg.norm(b, axis=0))
+    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)) / (2 * np.pi))
+
+
+def _simplices(points: np.ndarray, corners: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    """Gradients (d, c) of the linear functions of each corner, and the lengths or areas (c,), of lines or triangles."""
+    x = points[:, corners]  # (d, v, c)
+    if len(corners) == 2:
+        chord = x[:, 1] - x[:, 0]
+        square = np.sum(chord**2, axis=0)
+        return [-chord / square, chord / square], np.sqrt(square)
+    a, b = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+    aa, ab, bb = (np.sum(y * z, axis=0) for y, z in ((a, a), (a, b), (b, b)))
+    square = np.maximum(aa * bb - ab**2, 1e-300)
+    second, third = (bb * a - ab * b) / square, (aa * b - ab * a) / square
+    return [-second - third, second, third], np.sqrt(square) / 2
+
+
+def square_root(
+    K: sp.csr_matrix, mass: np.ndarray, shift: np.ndarray, share: np.ndarray, depth: np.ndarray, moves: np.ndarray
+) -> Root:
+    """Products with P and with G on the contacts of the mask `moves` (k,)."""
+    full = mass[moves] / share[moves]
+    weight = (np.sqrt(full * depth[moves]) * share[moves] ** EDGE)[:, None]
+    scale = sp.diags(full**-0.5)
+    L = sp.csc_matrix(scale @ K[moves][:, moves] @ scale + sp.diags(shift[moves]))
+    low, high = float(shift[moves].min()), float(abs(L).sum(axis=1).max())
+    eye = sp.eye(L.shape[0], format="csc")
+    order = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    poles = [(c, splu(L + s * eye, **order)) for c, s in zip(*inverse_root(low, high))]
+
+    def root(x: np.ndarray) -> np.ndarray:
+        return np.asarray(sum(c * factors.solve(x) for c, factors in poles))
+
+    return lambda x: weight * (L @ root(weight * x)), lambda x: root(x / weight) / weight
+
+
+def inverse_root(low: float, high: float, accuracy: float = ACCURACY) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients c (j,) and shifts s (j,) > 0 with x^-1/2 = sum of c / (x + s) for low <= x <= high, to that accuracy."""
+    m = low / high
+    inner, outer = float(ellipk(m)), float(ellipkm1(m))  # K(m) and K(1 - m)
+    count = int(np.ceil(-np.log(accuracy / 4) * outer / (2 * np.pi * inner)))
+    sn, cn, dn, _ = ellipj((np.arange(count) + 0.5) * outer / count, 1 - m)
+    return 2 * outer * np.sqrt(low) / (np.pi * count) * dn / cn**2, low * (sn / cn) ** 2

@@ -1,0 +1,138 @@
+"""Newton's method on contact forces and displacements at once: the same answers, for the price of a few solves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contactopt import InputError, natural_map_residual, reduce, reduce_bodies, scenes, solve
+from contactopt.analysis import progress
+from contactopt.analysis.solve_scene import Options, solve_scene
+from contactopt.bodies.solvers.multigrid import conjugate_gradients
+from contactopt.problem.certificate import Moved
+from contactopt.problem.laws import LAWS
+from contactopt.problem.laws.coulomb import Coulomb
+from contactopt.scenes import make_scene
+from contactopt.solving.kernels.coupled import Coupled, State, in_equilibrium
+from contactopt.solving.kernels.flexible import flexible_gmres
+
+SMALL = {"punch-2d": 16, "punch-3d": 4, "sphere": 8, "cattaneo-3d": 3, "cylinder-2d": 8}
+
+
+def both(scene, elements):
+    return reduce(scene, elements, Q="explicit"), reduce(scene, elements, solver="multigrid")
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_the_answer_is_that_of_the_dense_method(name):
+    dense, coupled = both(make_scene(name), SMALL[name])
+    expected, found = solve(dense, "newton", tol=1e-10), solve(coupled, "newton", tol=1e-9)
+    assert found.solved and coupled.Q.coupled.cycles > 0
+    assert np.abs(found.reactions - expected.reactions).max() < 1e-6 * np.abs(expected.reactions).max()
+    assert natural_map_residual(dense, found.reactions, found.multipliers) < 1e-8
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_it_solves_every_law(law):
+    dense, coupled = both(replace(scenes.flat_punch(3), law=law, mu=0.02 if law == "tresca" else 0.3), 4)
+    expected, found = solve(dense, "newton", tol=1e-9), solve(coupled, "newton", tol=1e-9)
+    assert found.solved
+    assert np.abs(found.reactions - expected.reactions).max() < 1e-6 * np.abs(expected.reactions).max()
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.2, 0.3, 0.4, 0.5])
+def test_friction_costs_no_more_cycles_than_four_products(mu):
+    reduction = reduce_bodies(scenes.flat_punch(3), 8, solver="multigrid")
+    r = np.random.default_rng(0).normal(size=reduction.problem.q.size)
+    product = [
+        conjugate_gradients(body.solver.A, body.solver.cycle, (B.T @ r)[body.body.free], 1e-8).cycles
+        for body, B in zip(reduction.bodies, reduction.maps)
+    ]
+    form = reduction.problem.Q.coupled
+    before = form.cycles
+    assert solve(replace(reduction.problem, law=Coulomb(mu)), "newton").solved
+    assert form.cycles - before <= 4 * max(product)
+
+
+def test_the_form_is_the_operator_before_condensation():
+    problem = reduce(scenes.flat_punch(3), 4, solver="multigrid")
+    form, r = problem.Q.coupled, np.random.default_rng(0).normal(size=problem.q.size)
+    X = in_equilibrium(form, r, 1e-11)
+    assert np.linalg.norm(form.unbalanced(X, r)) < 1e-8 * np.linalg.norm(r)
+    Qr = problem.Q @ r
+    assert np.allclose(form.moved(X, r), Qr, atol=1e-8 * np.abs(Qr).max())
+    added = np.arange(len(r)) * 1e-3
+    scaled = form.scaled(3.0, added)
+    X = in_equilibrium(scaled, r, 1e-11)
+    assert np.allclose(scaled.moved(X, r), 3 * Qr + added * r, atol=1e-8 * np.abs(Qr).max())
+    assert scaled.count is form.count
+
+
+def test_the_certificate_counts_what_is_missing_to_equilibrium():
+    problem = reduce(scenes.flat_punch(3), 4, Q="explicit")
+    solution = solve(problem, "newton", tol=1e-10)
+    r = solution.reactions
+    known = Moved(problem.Q @ r.ravel(), 1e-3)
+    assert natural_map_residual(problem, r, solution.multipliers, moved=known) == 1e-3
+    wrong = Moved(1.1 * problem.Q @ r.ravel(), 0.0)
+    assert natural_map_residual(problem, r, solution.multipliers, moved=wrong) > 1e-3
+
+
+def test_the_stated_accuracy_is_the_error_of_the_displacements():
+    """Against displacements in equilibrium; a V-cycle is close to the inverse, not the inverse."""
+    problem = reduce(scenes.flat_punch(3), 4, solver="multigrid")
+    form, r = problem.Q.coupled, np.random.default_rng(0).normal(size=problem.q.shape)
+    exact = in_equilibrium(form, r, 1e-12)
+    for seed, size in enumerate((1e-6, 1e-3, 1e-1)):
+        off = np.random.default_rng(seed).normal(size=form.size)
+        X = exact + size * np.linalg.norm(exact) / np.linalg.norm(off) * off
+        judged = Coupled.judged(_bare(form), State(X, r, np.zeros(0)), np.zeros(r.shape))[2]
+        error = X - exact
+        true = np.sqrt((error @ form.stiffness(error)) / (X @ form.stiffness(X)))
+        assert 0.5 * true < judged.accuracy < 1.5 * true
+        assert np.linalg.norm(judged.value - problem.Q @ r.ravel()) < np.linalg.norm(form.trace @ error)
+
+
+def _bare(form):
+    return Coupled(None, form, None)
+
+
+def test_it_starts_where_it_is_told():
+    problem = reduce(scenes.flat_punch(3), 6, solver="multigrid")
+    cold = solve(problem, "newton", tol=1e-9)
+    warm = solve(problem, "newton", tol=1e-8, start=cold)
+    assert warm.solved and warm.iterations < cold.iterations
+
+
+def test_bodies_with_factors_have_no_coupled_form():
+    problem = reduce(scenes.flat_punch(2), 8, Q="implicit", solver="superlu")
+    with pytest.raises(InputError, match="take the solver 'multigrid'"):
+        solve(problem, "newton", linear="coupled")
+
+
+def test_flexible_gmres_bears_a_preconditioner_that_changes():
+    random = np.random.default_rng(0)
+    A = np.eye(60) + 0.3 * random.normal(size=(60, 60)) / np.sqrt(60)
+    b, weights, calls = random.normal(size=60), random.uniform(0.1, 10.0, 60), [0]
+
+    def inverse(x):
+        calls[0] += 1
+        return x * (1 + 0.3 * np.sin(calls[0] + np.arange(60)))
+
+    for rtol in (1e-1, 1e-4, 1e-9):  # the last takes several runs
+        x = flexible_gmres(lambda x: A @ x, inverse, b, weights, rtol)
+        assert np.linalg.norm(weights * (b - A @ x)) <= 1.01 * rtol * np.linalg.norm(weights * b)
+
+
+def test_long_solves_say_what_they_reached(monkeypatch):
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    said: list[str] = []
+    solved = solve_scene(scenes.flat_punch(3), 4, options=Options(solver="multigrid", note=said.append))
+    steps = [line for line in said if line.startswith("step")]
+    assert len(steps) == solved.solution.iterations
+    assert "V-cycles" in steps[0] and "GiB" in steps[0] and "s left" in steps[1] and "s left" not in steps[-1]
+
+
+def test_time_left_goes_on_as_the_last_step():
+    assert progress.remaining([(0.0, 1.0), (10.0, 1e-2), (12.0, 1e-4)], 1e-8) == ", about 4 s left"
+    assert progress.remaining([(0.0, 1e-3), (1.0, 1e-2)], 1e-8) == ""
