@@ -127,4 +127,5 @@ def _half_space(reduction: Reduction, name: str | None) -> HalfSpaceBody:
     if not candidates:
         named = "" if name is None else f" named '{name}'"
         raise InputError(f"scene '{reduction.scene.name}' has no half-space{named}; this is asked of half-spaces only.")
-    return candidates[-1]
+    found: HalfSpaceBody = candidates[-1]  # type: ignore[assignment]
+    return found

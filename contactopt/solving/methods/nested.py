@@ -113,7 +113,7 @@ def robust_start(coarsest: Level, point: Point) -> Point:
     V = np.moveaxis(coarsest.V, 0, 1).reshape(coarsest.q.size, -1)
     small = InterfaceProblem(coarsest.kernel.entries(), coarsest.q.T, coarsest.law, V=V, s=coarsest.s)
     best = at.residual
-    for r, lam in islice(find_method("auto").iterate(small), TRIES):
+    for r, lam, *_ in islice(find_method("auto").iterate(small), TRIES):
         candidate = np.ascontiguousarray(r.T), lam
         residual = coarsest.evaluate(*candidate).residual
         if residual < best:
