@@ -48,7 +48,7 @@ def fake(monkeypatch, answer):
     import qpsolvers
 
     class Answer:
-        y = None
+        y, found = None, True
 
         def __init__(self, x):
             self.x = x
