@@ -20,6 +20,7 @@ from contactopt.bodies.subsurface import boussinesq_cerruti, flamant
 from contactopt.interface.reduction import reduce_bodies
 from contactopt.problem.convolution import Convolution
 from contactopt.scenes.surfaces import read_surface, rms_slope, self_affine
+from contactopt.solving.methods.nested import Nested
 
 STEEL, SOFT = Material(5.0, 0.3), Material(2.0, 0.45)
 E_STAR = STEEL.E / (1 - STEEL.nu**2)
@@ -169,7 +170,7 @@ def test_coarse_kernel_lumps_contacts():
 def test_nested_grids_give_the_answer_of_the_dense_method(law):
     mu = 0.01 if law == "tresca" else 0.3
     problem = contactopt.reduce(ball(26, law=law, mu=mu, shear=0.0 if law == "frictionless" else 0.4))
-    nested = contactopt.solve(problem, "nested", tol=1e-9)
+    nested = contactopt.solve(problem, Nested(), tol=1e-9)
     dense = contactopt.solve(problem.explicit(), tol=1e-9)
     assert nested.solved and dense.solved and nested.products > 0
     assert natural_map_residual(problem.explicit(), nested.reactions, nested.multipliers) < 1e-9
@@ -444,7 +445,7 @@ def test_surface_of_an_instrument(tmp_path):
         (lambda: self_affine((16, 16), (1.0, 1.0), shortest=0.01), "wavelengths must grow"),
         (lambda: self_affine((16, 16), (1.0, 1.0), hurst=1.5), "Hurst"),
         (lambda: scenes.cattaneo_half_space(shear=50.0), "slide off"),
-        (lambda: contactopt.solve(contactopt.reduce(scenes.flat_punch(2, elements=4)), "nested"), "needs half-spaces"),
+        (lambda: contactopt.solve(contactopt.reduce(scenes.flat_punch(2, elements=4)), Nested()), "needs half-spaces"),
     ],
 )  # fmt: skip
 def test_bad_input_is_refused(make, message):

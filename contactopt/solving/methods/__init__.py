@@ -41,11 +41,6 @@ class Method(Protocol):
 METHODS = {
     "auto": ("contactopt.solving.methods.auto", "Auto", "Newton, then cones and proximal where it fails; the default"),
     "newton": ("contactopt.solving.methods.newton", "Newton", "semismooth Newton on the Alart-Curnier equations"),
-    "nested": (
-        "contactopt.solving.methods.nested",
-        "Nested",
-        "Newton on nested grids, for half-spaces (Q a convolution)",
-    ),
     "proximal": ("contactopt.solving.methods.proximal", "Proximal", "proximal-point loop around Newton"),
     "tresca": ("contactopt.solving.methods.tresca", "Tresca", "successive convex problems with given friction bounds"),
     "acary_cadoux": ("contactopt.solving.methods.cone", "AcaryCadoux", "fixed point on the SOCP over Coulomb's cones"),

@@ -35,12 +35,40 @@ def norm(m: float, h: float) -> np.ndarray:
 
 
 def p21(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
-    """P21 of eq (25) or, in 3D, P31 of eq (29) on the grid of the contacts; `still` (k, dim) masks what cannot move."""
+    """P21 of eq (25) or, in 3D, P31 of eq (29) on the grid of the contacts.
+
+    Parameters
+    ----------
+    problem : whose contacts lie on a line or a rectangular grid of their chart
+    still : (k, dim) mask of the components that cannot move
+
+    Returns
+    -------
+    Products with P and, where it is cheap, with its inverse; they act on arrays (k, dim).
+
+    Raises
+    ------
+    InputError : if the contacts lie on no such grid
+    """
     return on_grid(problem, still, extended)
 
 
 def p22(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
-    """P22 of eq (26) on the contact line; `still` (k, dim) masks what cannot move."""
+    """P22 of eq (26) on the contact line.
+
+    Parameters
+    ----------
+    problem : whose contacts lie on a line or a rectangular grid of their chart
+    still : (k, dim) mask of the components that cannot move
+
+    Returns
+    -------
+    Products with P and, where it is cheap, with its inverse; they act on arrays (k, dim).
+
+    Raises
+    ------
+    InputError : if the contacts lie on no such grid
+    """
     return on_grid(problem, still, inverse_of_extended)
 
 

@@ -80,7 +80,21 @@ def direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
 
 
 def neumann(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
-    """The root on the grid of the contacts, and its inverse; `still` (k, dim) masks what cannot move."""
+    """Square root of the Laplacian on the grid of the contacts, and its inverse.
+
+    Parameters
+    ----------
+    problem : whose contacts lie on a line or a rectangular grid of their chart
+    still : (k, dim) mask of the components that cannot move
+
+    Returns
+    -------
+    Products with P and, where it is cheap, with its inverse; they act on arrays (k, dim).
+
+    Raises
+    ------
+    InputError : if the contacts lie on no such grid
+    """
     return on_grid(problem, still, root_on_grid)
 
 

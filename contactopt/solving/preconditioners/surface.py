@@ -40,7 +40,16 @@ Root = tuple[Act, Act]  # products with P and with G = P^-1
 def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
     """Products (k, dim) -> (k, dim) with P and with its inverse G, scaled to a mean diagonal of one.
 
-    `still` (k, dim) masks what cannot move. The mean diagonal is an estimate by random signs (Hutchinson 1989).
+    The mean diagonal is an estimate by random signs (Hutchinson 1989).
+
+    Parameters
+    ----------
+    problem : whose chart knows the cells of the contact surface
+    still : (k, dim) mask of the components that cannot move
+
+    Returns
+    -------
+    The two products.
 
     Raises
     ------
