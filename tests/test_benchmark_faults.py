@@ -566,7 +566,9 @@ def test_killed_processes_cost_their_own_run_only(tmp_path):
                 killed += 1
         if rounds < 2:
             os.killpg(process.pid, signal.SIGKILL)
-        assert process.wait(120) == (0 if rounds == 2 else -signal.SIGKILL)
+        # A solver killed while it starts may end the campaign with 2, which says that a run left no row.
+        assert process.wait(120) in ((0, 2) if rounds == 2 else (-signal.SIGKILL,))
+    assert subprocess.run(command, timeout=120, **quiet).returncode == 0
     rows = list(lines(out / "rows.jsonl"))
     keys = [row["key"] for row in rows]
     assert len(keys) == len(set(keys)) and set(keys) == expected
