@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import weakref
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future
 from functools import cached_property
+from queue import SimpleQueue
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -26,27 +28,39 @@ from contactopt.bodies.solvers.system import (
 class FactorThread:
     """One thread that makes factors and frees them: SuperLU returns memory only in the thread that took it.
 
-    The thread ends, and its factors are freed, when nobody refers to this object any more.
+    The thread ends, and its factors are freed, when nobody refers to this object any more. Python may find that out
+    in the middle of any other operation, so the message that ends the thread goes through a `SimpleQueue`, whose
+    `put` takes no lock that the interrupted operation could hold.
     """
 
     def __init__(self) -> None:
-        self._executor = ThreadPoolExecutor(1, thread_name_prefix="superlu")
         self._held: list[Any] = []
-        weakref.finalize(self, _free, self._executor, self._held).atexit = False
+        self._asked: SimpleQueue[tuple[sp.csc_matrix, Future[int]] | None] = SimpleQueue()
+        weakref.finalize(self, self._asked.put, None).atexit = False
+        Thread(target=_keep_factors, args=(self._asked, self._held), name="superlu", daemon=True).start()
 
     def factorise(self, A: sp.csc_matrix) -> int:
         """Factorise A without a change of order and return the number under which [] finds the factors."""
-        self._held.append(self._executor.submit(factorise, A).result())
-        return len(self._held) - 1
+        number: Future[int] = Future()
+        self._asked.put((A, number))
+        return number.result()
 
     def __getitem__(self, number: int) -> Any:
         """SciPy's SuperLU object. Whoever keeps it longer than this thread keeps its memory for good."""
         return self._held[number]
 
 
-def _free(executor: ThreadPoolExecutor, held: list[Any]) -> None:
-    executor.submit(held.clear)
-    executor.shutdown(wait=False)
+def _keep_factors(asked: SimpleQueue[tuple[sp.csc_matrix, Future[int]] | None], held: list[Any]) -> None:
+    """Factorise what is asked for until None comes, then free all factors: the work of a FactorThread."""
+    while (request := asked.get()) is not None:
+        A, number = request
+        try:
+            held.append(factorise(A))
+            number.set_result(len(held) - 1)
+        except BaseException as error:  # raised where the factors were asked for
+            number.set_exception(error)
+        del request, A, number  # what is kept here while the thread waits would be kept for nobody
+    held.clear()
 
 
 def factorise(A: sp.csc_matrix) -> Any:
