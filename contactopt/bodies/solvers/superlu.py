@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import weakref
-from concurrent.futures import Future
+from _thread import start_new_thread
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import cached_property
-from queue import SimpleQueue
-from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -29,38 +29,29 @@ class FactorThread:
     """One thread that makes factors and frees them: SuperLU returns memory only in the thread that took it.
 
     The thread ends, and its factors are freed, when nobody refers to this object any more. Python may find that out
-    in the middle of any other operation, so the message that ends the thread goes through a `SimpleQueue`, whose
-    `put` takes no lock that the interrupted operation could hold.
+    in the middle of any other operation of any thread, one that holds the locks of another pool, say. The thread is
+    therefore told by a thread of a moment's life, which may wait for these locks.
     """
 
     def __init__(self) -> None:
+        self._executor = ThreadPoolExecutor(1, thread_name_prefix="superlu")
         self._held: list[Any] = []
-        self._asked: SimpleQueue[tuple[sp.csc_matrix, Future[int]] | None] = SimpleQueue()
-        weakref.finalize(self, self._asked.put, None).atexit = False
-        Thread(target=_keep_factors, args=(self._asked, self._held), name="superlu", daemon=True).start()
+        weakref.finalize(self, start_new_thread, _free, (self._executor, self._held)).atexit = False
 
     def factorise(self, A: sp.csc_matrix) -> int:
         """Factorise A without a change of order and return the number under which [] finds the factors."""
-        number: Future[int] = Future()
-        self._asked.put((A, number))
-        return number.result()
+        self._held.append(self._executor.submit(factorise, A).result())
+        return len(self._held) - 1
 
     def __getitem__(self, number: int) -> Any:
         """SciPy's SuperLU object. Whoever keeps it longer than this thread keeps its memory for good."""
         return self._held[number]
 
 
-def _keep_factors(asked: SimpleQueue[tuple[sp.csc_matrix, Future[int]] | None], held: list[Any]) -> None:
-    """Factorise what is asked for until None comes, then free all factors: the work of a FactorThread."""
-    while (request := asked.get()) is not None:
-        A, number = request
-        try:
-            held.append(factorise(A))
-            number.set_result(len(held) - 1)
-        except BaseException as error:  # raised where the factors were asked for
-            number.set_exception(error)
-        del request, A, number  # what is kept here while the thread waits would be kept for nobody
-    held.clear()
+def _free(executor: ThreadPoolExecutor, held: list[Any]) -> None:
+    with suppress(RuntimeError):  # Python is ending: there is nothing left to free
+        executor.submit(held.clear)
+    executor.shutdown(wait=False)
 
 
 def factorise(A: sp.csc_matrix) -> Any:
