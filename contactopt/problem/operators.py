@@ -25,9 +25,10 @@ FORMS = ("auto", "explicit", "implicit")  # of Q
 NOISE = 1e-13  # relative size of what rounding leaves of a zero
 FINEST = 1e-11  # accuracy of products that is not asked for more
 COLUMNS = 64  # unit vectors handed to the bodies at a time when the entries of Q are asked for
-NOTABLE = 2**28  # bytes of an array Q from which on its size is logged: a quarter of a gigabyte
-MOST = 2**34  # bytes of an array Q that is refused: 16 gigabytes
+NOTABLE_BYTES = 2**28  # bytes of an array Q from which on its size is logged: a quarter of a gigabyte
+MOST_BYTES = 8_000_000_000  # of an array Q; those who factorise it need another one or two of its size
 
+# (X (n,) or (n, j), relative accuracy or None for the best there is) -> the product with X, of its shape
 Product = Callable[[np.ndarray, float | None], np.ndarray]
 
 
@@ -137,28 +138,31 @@ def sparse(Q: object) -> sp.csr_array:
 
 
 def check_dense(n: int) -> None:
-    """Before Q (n, n) is formed as an array: log its size if it is NOTABLE, and refuse it beyond MOST.
+    """Before Q (n, n) is formed as an array: log its size, as a warning from NOTABLE_BYTES on, and refuse it beyond MOST_BYTES.
 
     Raises
     ------
     InputError
-        With the size in bytes, if the array would take more than MOST.
+        With the size in bytes, if the array would take more than MOST_BYTES.
     """
     size = 8 * n**2
-    if size > MOST:
+    if size > MOST_BYTES:
         raise InputError(
-            f"Q as an array of {n} x {n} entries would take {size:,} bytes, more than {MOST:,}; take Q = 'implicit' and a "
+            f"Q as an array of {n} x {n} entries would take {size:,} bytes, more than {MOST_BYTES:,}; take Q = 'implicit' and a "
             "method that uses products with Q, such as newton, or fewer elements."
         )
-    if size >= NOTABLE:
-        log.warning("forming Q as an array of %d x %d entries: %s bytes", n, n, f"{size:,}")
+    level = logging.WARNING if size >= NOTABLE_BYTES else logging.INFO
+    log.log(level, "forming Q as an array of %d x %d entries: %s bytes", n, n, f"{size:,}")
 
 
 def dense(Q: Interface) -> np.ndarray:
-    """Q as an array (n, n)."""
+    """Q as an array (n, n); InputError if it would be larger than MOST_BYTES."""
     if isinstance(Q, InterfaceOperator):
         return Q.to_dense()
-    return np.asarray(Q.toarray()) if sp.issparse(Q) else Q
+    if not sp.issparse(Q):
+        return Q
+    check_dense(Q.shape[0])
+    return np.asarray(Q.toarray())
 
 
 def diagonal(Q: Interface) -> np.ndarray:

@@ -28,7 +28,7 @@ from contactopt.solving.methods import NATIVE, Iterate
 FALL, RISE = 5.0, 8.0
 GENTLE = 1.5, 3.0  # fall and rise of the gentle loop, which falls after subproblems of at most EASY steps only
 EASY = 6
-SMALLEST, LARGEST = 1e-12, 1e6  # weights; where even the largest fails, the loop ends
+LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6  # of the proximal term; where even the largest fails, the loop ends
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def proximal_iterates(
     gentle  alpha changes slowly, so that few subproblems fail: for problems on which every smaller alpha soon fails
     """
     (fall, rise), easy = (GENTLE, EASY) if gentle else ((FALL, RISE), STEPS)
-    while alpha < LARGEST:
+    while alpha < LARGEST_WEIGHT:
         equations.at(point[0], alpha)
         new, solved, steps = equations.solve(*point)
         yield new
@@ -75,4 +75,4 @@ def proximal_iterates(
         if not solved:
             alpha *= rise
         elif steps <= easy:
-            alpha = max(alpha / fall, SMALLEST)
+            alpha = max(alpha / fall, LEAST_WEIGHT)
