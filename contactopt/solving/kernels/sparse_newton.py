@@ -6,6 +6,9 @@ generalised derivative of P, block diagonal. Contacts where D = 0 (open) are kno
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from functools import cached_property
+
 import numpy as np
 
 from contactopt.solving.deadline import check_time
@@ -21,22 +24,35 @@ DONE = 1e-13
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, d), multipliers (p,)
 
 
+@dataclass(frozen=True, eq=False)
 class ProximalEquations:
-    """The equations of the proximal subproblems of one dimensionless problem.
+    """The equations of one proximal subproblem of a dimensionless problem; with weight 0 they are those of the problem itself.
 
-    q (k, d), V (k d, p), s (p,); compliance (k,) of the contacts, of which rho = 1 / (compliance + weight) is made
+    matrix        Q, with the factors of Newton's matrices
+    q, V, s       (k, d), (k d, p) and (p,) of the problem
+    project       the projection of the law with its derivative
+    compliance    (k,) of the contacts, of which rho = 1 / (compliance + weight) is made
+    center        (k, d) forces from which the proximal term counts; not used while the weight is 0
+    weight        of the proximal term
     """
 
-    def __init__(
-        self, matrix: Blocks, q: np.ndarray, V: np.ndarray, s: np.ndarray, project: Projection, compliance: np.ndarray
-    ):
-        self.matrix, self.q, self.V, self.s, self.project, self.compliance = matrix, q, V, s, project, compliance
-        self.at(np.zeros_like(q), 0.0)
+    matrix: Blocks
+    q: np.ndarray
+    V: np.ndarray
+    s: np.ndarray
+    project: Projection
+    compliance: np.ndarray
+    center: np.ndarray | float = 0.0
+    weight: float = 0.0
 
-    def at(self, center: np.ndarray, weight: float) -> None:
-        """Move to the subproblem of that center and weight."""
-        self.center, self.weight = center, weight
-        self.rho = 1 / np.maximum(self.compliance + weight, 1e-3)
+    def at(self, center: np.ndarray, weight: float) -> ProximalEquations:
+        """The subproblem of that center and weight."""
+        return replace(self, center=center, weight=weight)
+
+    @cached_property
+    def rho(self) -> np.ndarray:
+        """(k,) steps of the fixed-point equations."""
+        return np.asarray(1 / np.maximum(self.compliance + self.weight, 1e-3))
 
     def evaluate(self, r: np.ndarray, lam: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """Norm of the residual, P(y) - r (k, d), V'r + s (p,) and the derivative of P at y = r - rho u."""

@@ -178,11 +178,11 @@ class Auto:
         problem: InterfaceProblem, matrix: Blocks, start: Iterate, patience: int, alpha: float, gentle: bool = False
     ) -> Generator[Iterate, None, Iterate]:
         """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last."""
-        equations, check = (proximal_equations(problem, matrix) for _ in range(2))
+        equations = proximal_equations(problem, matrix)
         best, target, point = np.inf, np.inf, start
         for done, point in enumerate(proximal_iterates(equations, start, alpha, gentle), start=1):
             yield point
-            best = min(best, check.evaluate(*point)[0])
+            best = min(best, equations.evaluate(*point)[0])
             if done % patience == 0:
                 if best > target:
                     break

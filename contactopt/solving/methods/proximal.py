@@ -54,7 +54,7 @@ class Proximal:
 
 
 def proximal_equations(problem: InterfaceProblem, matrix: Blocks) -> ProximalEquations:
-    """Alart and Curnier's equations of a dimensionless problem, to be centred."""
+    """Alart and Curnier's equations of a dimensionless problem, without a proximal term."""
     compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1)
     return ProximalEquations(matrix, problem.q, problem.V, problem.s, problem.law.project, compliance)
 
@@ -68,8 +68,7 @@ def proximal_iterates(
     """
     (fall, rise), easy = (GENTLE, EASY) if gentle else ((FALL, RISE), STEPS)
     while alpha < LARGEST_WEIGHT:
-        equations.at(point[0], alpha)
-        new, solved, steps = equations.solve(*point)
+        new, solved, steps = equations.at(point[0], alpha).solve(*point)
         yield new
         point = new if solved else point
         if not solved:
