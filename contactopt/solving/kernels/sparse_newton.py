@@ -11,15 +11,12 @@ from functools import cached_property
 
 import numpy as np
 
+from contactopt.solving.constants import ENOUGH, MEMORY, SHORTEST, SUBPROBLEM_STEPS
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.semismooth import Projection
 from contactopt.solving.kernels.sparse_blocks import Blocks, bordered
 
-STEPS = 15  # of one proximal subproblem
-SHORTEST = 1e-2  # of a line search
-MEMORY = 4  # a step is accepted that is below the worst of so many residuals
-ENOUGH = 0.1  # a subproblem is solved when its residual is this much smaller than the change that it makes
-DONE = 1e-13
+DONE = 1e-13  # residual over the size of the forces at which rounding ends the iteration
 
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, d), multipliers (p,)
 
@@ -86,7 +83,7 @@ class ProximalEquations:
         """The last iterate of Newton's method with a line search, whether it solves the subproblem, and the steps."""
         residual, error, balance, D = self.evaluate(r, lam)
         recent = [residual]
-        for steps in range(1, STEPS + 1):
+        for steps in range(1, SUBPROBLEM_STEPS + 1):
             check_time()
             change = self.step(error, balance, D)
             if change is None:
@@ -105,4 +102,4 @@ class ProximalEquations:
             moved = self.weight * float(np.linalg.norm(self.rho[:, None] * (r - self.center)))
             if residual <= max(DONE * float(np.linalg.norm(r)), ENOUGH * moved):
                 return (r, lam), True, steps
-        return (r, lam), False, STEPS
+        return (r, lam), False, SUBPROBLEM_STEPS

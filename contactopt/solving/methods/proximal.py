@@ -20,14 +20,12 @@ import numpy as np
 from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
+from contactopt.solving.constants import EASY, FALL, GENTLE_FALL, GENTLE_RISE, RISE, SUBPROBLEM_STEPS
 from contactopt.solving.kernels.alart_curnier import cold_start
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
-from contactopt.solving.kernels.sparse_newton import STEPS, ProximalEquations
+from contactopt.solving.kernels.sparse_newton import ProximalEquations
 from contactopt.solving.methods import NATIVE, Iterate
 
-FALL, RISE = 5.0, 8.0
-GENTLE = 1.5, 3.0  # fall and rise of the gentle loop, which falls after subproblems of at most EASY steps only
-EASY = 6
 LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6  # of the proximal term; where even the largest fails, the loop ends
 
 
@@ -66,7 +64,7 @@ def proximal_iterates(
 
     gentle  alpha changes slowly, so that few subproblems fail: for problems on which every smaller alpha soon fails
     """
-    (fall, rise), easy = (GENTLE, EASY) if gentle else ((FALL, RISE), STEPS)
+    (fall, rise), easy = ((GENTLE_FALL, GENTLE_RISE), EASY) if gentle else ((FALL, RISE), SUBPROBLEM_STEPS)
     while alpha < LARGEST_WEIGHT:
         new, solved, steps = equations.at(point[0], alpha).solve(*point)
         yield new
