@@ -44,14 +44,17 @@ def check(exercise: str, answer: Any, right: Any) -> bool | None:
 
 
 def _judge(answer: Any, right: Any) -> bool:
-    if isinstance(right, InterfaceProblem):
-        forces = np.asarray(answer, float)
-        return forces.size == right.q.size and natural_map_residual(right, forces.reshape(right.q.shape)) <= CERTIFIED
     if callable(right):
         return bool(right(answer))
-    if np.shape(answer) != np.shape(right):
+    try:
+        given = np.asarray(answer, dtype=float)
+    except (TypeError, ValueError):  # no numbers at all
         return False
-    return bool(np.allclose(answer, right, rtol=CLOSE, atol=CLOSE * float(np.max(np.abs(right), initial=0.0))))
+    if isinstance(right, InterfaceProblem):
+        return given.size == right.q.size and natural_map_residual(right, given.reshape(right.q.shape)) <= CERTIFIED
+    exact = np.asarray(right, dtype=float)
+    size = float(np.abs(exact).max(initial=0.0))
+    return given.shape == exact.shape and bool(np.allclose(given, exact, rtol=CLOSE, atol=CLOSE * size))
 
 
 class Slider:
@@ -79,7 +82,9 @@ class Slider:
             f' style="max-width: 100%; display: {"block" if number == self.start else "none"}">'
             for number, (value, frame) in enumerate(zip(self.values, self.frames))
         )
-        shown = "[...box.querySelectorAll('img')].forEach((i, k) => i.style.display = k == this.value ? 'block' : 'none')"
+        shown = (
+            "[...box.querySelectorAll('img')].forEach((i, k) => i.style.display = k == this.value ? 'block' : 'none')"
+        )
         return (
             f'<div class="slider" style="max-width: 40em"><label>{escape(self.label)}<br><input type="range" min="0"'
             f' max="{len(self.values) - 1}" value="{self.start}" style="width: 100%"'

@@ -128,7 +128,9 @@ dual.solve(solver=cp.CLARABEL)
 print(f"force r = {r.value:.4f} N, multiplier u = {push.dual_value:.4f} mm")
 
 assert np.isclose(r.value, F - k * g0, atol=1e-4)
-assert np.isclose(primal.value + dual.value, F * g0 - F**2 / (2 * k), atol=1e-4)  # up to the sign and a constant they are equal
+assert np.isclose(
+    primal.value + dual.value, F * g0 - F**2 / (2 * k), atol=1e-4
+)  # up to the sign and a constant they are equal
 
 # %% [markdown]
 # contactopt solves the same problem. It wants one row of $q$ per contact, with a normal and a tangential component. Our

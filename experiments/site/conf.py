@@ -20,7 +20,15 @@ copyright = author
 version = release = contactopt.__version__
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx-mathjax-offline"]
-exclude_patterns = ["*.py", "notes", "accuracy.md", "performance.md", "**/__pycache__"]
+exclude_patterns = [
+    "*.py",
+    "notes",
+    "accuracy.md",
+    "performance.md",
+    "course.md",
+    "generated/notebooks",
+    "**/__pycache__",
+]
 html_theme, html_title = "furo", f"contactopt {version}"
 html_static_path, html_css_files = ["_static"], ["site.css"]
 html_show_sourcelink, html_copy_source = False, False
