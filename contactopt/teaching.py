@@ -73,7 +73,7 @@ class Slider:
     """
 
     def __init__(self, label: str, values: Sequence[float], draw: Callable[[float], Any], start: int = 0) -> None:
-        self.label, self.values, self.start = label, [float(value) for value in values], start
+        self.label, self.values, self.start = label, list(values), start
         self.frames = [_picture(draw(value)) for value in self.values]
 
     def _repr_html_(self) -> str:

@@ -36,10 +36,9 @@ ax.fill([0, 20, 20, 0], [0, 0, 40, 40], color="C0", alpha=0.25, lw=0)
 ax.fill([0, 45, 45, 0], [0, 0, -25, -25], color="C1", alpha=0.25, lw=0)
 ax.plot([0, 0], [-25, 44], "k-.", lw=0.8)
 ax.annotate("", (10, 40), (10, 50), arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2})
-ax.annotate("", (30, 5), (24, 5), arrowprops={"arrowstyle": "-|>", "color": "k"})
-ax.text(24, 8, "$t$")
-ax.annotate("", (24, 11), (24, 5), arrowprops={"arrowstyle": "-|>", "color": "k"})
-ax.text(20.8, 8, "$n$")
+for head, name in (((40, 6), "$t$"), ((28, 18), "$n$")):
+    ax.annotate("", head, (28, 6), arrowprops={"arrowstyle": "-|>", "color": "k"})
+    ax.text(head[0] + 1, head[1] + 1, name)
 ax.plot(problem.coordinates[0], problem.coordinates[1], "k.", ms=3)
 ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48))
 
@@ -159,7 +158,7 @@ for name, label in (
         begin = time.perf_counter()
         found = solve(problem, name, tol=tol, time_limit=3.0)
         points.append((time.perf_counter() - begin, max(found.residual, 1e-14)))
-    ax.loglog(*np.transpose(points), "o-", mfc="none", label=label)
+    ax.semilogy(*np.transpose(points), "o-", mfc="none", label=label)
 ax.set(xlabel="time [s]", ylabel="certificate [-]")
 ax.legend(frameon=False, fontsize=8)
 

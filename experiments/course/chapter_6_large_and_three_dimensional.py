@@ -82,9 +82,9 @@ slips = shear > (1 - 1e-6) * 0.3 * pressure
 x, y = problem.coordinates[:2]
 
 fig, ax = plt.subplots(figsize=(4.6, 3.8), layout="constrained")
-dots = ax.scatter(x, y, c=pressure / problem.areas, s=60, marker="s")
-ax.quiver(x, y, *np.where(shear > 0, answer.reactions[:, 1:].T, 0), color="white", width=0.006)
-ax.plot(x[slips], y[slips], "rx", ms=5, label="slips")
+dots = ax.scatter(x, y, c=pressure / problem.areas, s=110, marker="s", alpha=0.6)
+ax.quiver(x, y, *answer.reactions[:, 1:].T, color="black", width=0.005, zorder=3)
+ax.plot(x[slips], y[slips], "rx", ms=5, label="slips", zorder=4)
 ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
 ax.legend(loc="upper right")
 fig.colorbar(dots, label="pressure [MPa]")
