@@ -37,6 +37,7 @@ myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 3
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 nb_execution_mode, nb_execution_timeout = "force", 180
+nb_execution_excludepatterns = ["**/solutions_*"]  # a second run of the chapters; the tests execute the solutions
 nb_execution_raise_on_error, nb_execution_in_temp, nb_merge_streams = True, True, True
 
 autodoc_member_order, autodoc_typehints = "bysource", "signature"
