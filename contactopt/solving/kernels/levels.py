@@ -26,7 +26,7 @@ from contactopt.solving.deadline import check_time
 RESTART, CYCLES = 40, 3  # of GMRES
 ITERATIONS = 100  # of PCG
 COARSEST = 12  # contacts a side
-FIRST, RATIO = 0.5, 8.0  # of the shifts of `shift_shares`: where they begin to grow, and by how much
+FIRST, RATIO = 0.5, 32.0  # of the shifts of `shift_shares`: where they begin to grow, and by how much
 
 Point = tuple[np.ndarray, np.ndarray]  # reactions (c, k), multipliers (p,)
 
