@@ -185,7 +185,7 @@ class HalfSpace:
         given = self.points(elements, zone) if callable(self.points) else self.points
         if not isinstance(given, (tuple, list, np.ndarray)) or len(given) == 0:
             raise InputError(
-                f"half-space '{self.name}': its points must be {axes} rows of places, one per axis; got {short(given)}."
+                f"half-space '{self.name}': its points must be given by one row of places per axis; got {short(given)}."
             )
         rows = (given,) if np.ndim(given[0]) == 0 else tuple(given)
         if len(rows) != axes:

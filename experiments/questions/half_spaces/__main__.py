@@ -13,7 +13,7 @@ import sys
 from experiments.questions.half_spaces.exact import cattaneo_rows, hertz_rows, kernel_rows
 from experiments.questions.half_spaces.measured import Row
 from experiments.questions.half_spaces.models import chart_rows, draw_limits, draw_speed, limit_rows
-from experiments.questions.half_spaces.rough import rough_rows, tamaas_rows, wavy_rows
+from experiments.questions.half_spaces.rough import friction_rows, rough_rows, tamaas_rows, wavy_rows
 from experiments.report import REPORTS, write
 
 TABLES = {
@@ -22,6 +22,7 @@ TABLES = {
     "cattaneo": cattaneo_rows,
     "wavy": wavy_rows,
     "rough": rough_rows,
+    "friction": friction_rows,
     "tamaas": tamaas_rows,
     "chart": chart_rows,
     "limits": limit_rows,
@@ -62,9 +63,11 @@ finest grid. Every row is made by a process of its own; "kB a point" is what its
 
 {wavy}
 
-The same with 64 waves along a side at most:
+The same with 64 waves along a side at most, without friction and with it:
 
 {rough}
+
+{friction}
 
 ## Tamaas
 

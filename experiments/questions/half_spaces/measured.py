@@ -28,7 +28,9 @@ def apart(act: Callable[..., Any], *arguments: Any) -> Any:
     """act(*arguments) in a new process, whose largest memory is its own."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, mp_context=context) as pool:
-        return pool.submit(act, *arguments).result()
+        made = pool.submit(act, *arguments).result()
+    print(made, flush=True)  # long runs show how far they are
+    return made
 
 
 class Steps(logging.Handler):

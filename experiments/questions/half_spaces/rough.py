@@ -74,7 +74,11 @@ def wavy_rows() -> list[Row]:
 
 
 def rough_rows() -> list[Row]:
-    return growth("rough", (512, 1024, 2048), (512, 1024))
+    return growth("rough", (512, 1024, 2048), ())
+
+
+def friction_rows() -> list[Row]:
+    return growth("rough", (), (512, 1024))
 
 
 def tamaas_rows() -> list[Row]:
