@@ -61,7 +61,9 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
 
 def _mesh(surface: Surface) -> Mesh:
     if surface.mesh is None:
-        raise InputError(f"body '{surface.body}' has no mesh on its contact surface; couple it by matching nodes.")
+        raise InputError(
+            f"body '{surface.body}' has no mesh on its contact surface, so that its points must be those of the other surface."
+        )
     return surface.mesh
 
 
