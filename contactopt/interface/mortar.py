@@ -115,7 +115,7 @@ class Mortar:
         W, alone = self.weights[body], self.alone[body]
         made = [[sp.csr_matrix(W.shape)] * dim for _ in range(dim)]
         for c in range(dim):
-            made[c][c] = W - sp.diags(held[c].astype(float)) @ (W - alone)
+            made[c][c] = W - sp.diags(held[c].astype(float)) @ (W - alone) if held[c].any() else W
             if body == self.own and self.carried:
                 free = sp.diags((~held[c]).astype(float))
                 made[c] = [there - free @ part for there, part in zip(made[c], self.carried[c])]

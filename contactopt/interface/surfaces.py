@@ -80,12 +80,19 @@ def _cells(side: Faces, nodes: np.ndarray) -> np.ndarray:
 def _map(m: Mortar, body: int, mesh: Mesh, held: np.ndarray, frames: np.ndarray, order: np.ndarray) -> sp.csr_matrix:
     """T (k dim, n): the body's unknowns -> its part of the displacement of the contacts, in the frames and their order."""
     k, dim = frames.shape[:2]
-    rows, columns = np.arange(k * dim), np.repeat(np.arange(k), dim)
-    T = sp.csr_matrix((k * dim, len(mesh.held)))
+    place = np.empty(k, dtype=int)
+    place[order] = np.arange(k)
+    rows, columns, values = [], [], []
     for c, row in enumerate(m.components(body, held)):
-        turn = sp.csr_matrix((frames[:, :, c].ravel(), (rows, columns)), (k * dim, k))
         for unknowns, part in zip(mesh.unknowns, row):
-            entries = sp.coo_matrix(turn @ part[order])
-            T = T + sp.csr_matrix((entries.data, (entries.row, unknowns[entries.col])), T.shape)
+            if not part.nnz:
+                continue
+            entries = sp.coo_matrix(part)
+            contact = place[entries.row]
+            rows.append((contact[:, None] * dim + np.arange(dim)).ravel())
+            columns.append(np.repeat(unknowns[entries.col], dim))
+            values.append((frames[contact, :, c] * entries.data[:, None]).ravel())
+    index = np.concatenate(rows), np.concatenate(columns)
+    T = sp.csr_matrix((np.concatenate(values), index), (k * dim, len(mesh.held)))
     T.eliminate_zeros()
     return T
