@@ -69,7 +69,7 @@ def disc_in_plate(gmsh, path, dim, order, recombine=False, incomplete=False, ver
     return path
 
 
-@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize("version", [2.2, 4.0, 4.1])
 @pytest.mark.parametrize(
     "dim,order,recombine,incomplete,kind",
     [

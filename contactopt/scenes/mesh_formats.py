@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import InputError
+from contactopt.scenes import msh40
 
 LARGEST = 4_000_000_000  # bytes: a larger file holds more than can be solved
 # arrays of integers per element whose numbers are groups; those of others are named 'array=number'
@@ -118,6 +119,12 @@ def _read(path: Path) -> Any:
             f"mesh file '{path}': its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp (Abaqus, CalculiX), ..."
         )
     said = ""
+    stated = msh40.version(path) if "gmsh" in formats else None
+    if stated is not None and stated.partition(".")[0] not in ("2", "4"):
+        raise InputError(f"mesh file '{path}' is of version {stated} of Gmsh's format; save it in version 4.1 or 2.2.")
+    if stated in ("4", "4.0"):
+        with contextlib.suppress(ValueError, KeyError):  # some programs call version 4.1 so
+            return msh40.read_msh40(path)
     for name in sorted(formats, key=lambda name: name not in SAFE):
         printed = io.StringIO()
         try:  # on a damaged file readers raise anything, print what is wrong, and end the process
