@@ -208,11 +208,20 @@ class AssembledElastic:
 
     def surface(self, name: str | None = None) -> Surface:
         """The contact surface, with the places of its nodes on the curve that the part gives."""
-        name, body = name or self.part.contact, self.body
-        if name not in body.traces:
+        name = name or self.part.contact
+        if name not in self.body.traces:
             raise InputError(
-                f"body '{self.name}' has no contact surface {name!r}; it has {', '.join(sorted(body.traces))}."
+                f"body '{self.name}' has no contact surface {name!r}; it has {', '.join(sorted(self.body.traces))}."
             )
+        return self._surfaces[name]
+
+    @cached_property
+    def _surfaces(self) -> dict[str, Surface]:
+        """All of them, made once: a surface may take part in several pairs."""
+        return {name: self._surface(name) for name in self.body.traces}
+
+    def _surface(self, name: str) -> Surface:
+        body = self.body
         trace, unknowns = body.traces[name], body.unknowns
         nodes = np.unique(trace.weights.indices)
         places = body.locations[:, nodes]

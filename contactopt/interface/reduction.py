@@ -267,15 +267,18 @@ def _map_of(
     body: AssembledBody, sides: Sequence[tuple[AssembledBody, AssembledBody]], couplings: Sequence[Coupling]
 ) -> sp.csr_matrix:
     """B (k dim, n) of a body: the maps of the pairs that it takes part in, with their signs, and zeros elsewhere."""
-    blocks: list[sp.csr_matrix | int] = []
-    width = 0
-    for (upper, lower), made in zip(sides, couplings):
-        rows = made.frames.shape[0] * made.frames.shape[1]
-        own = made.upper if body is upper else -made.lower if body is lower else None
-        blocks.append(rows if own is None else own)
-        width = width if own is None else own.shape[1]
-    filled = [sp.csr_matrix((block, width)) if isinstance(block, int) else block for block in blocks]
-    return filled[0] if len(filled) == 1 else sp.csr_matrix(sp.vstack(filled, format="csr"))
+    ends = np.cumsum([0, *(made.frames.shape[0] * made.frames.shape[1] for made in couplings)])
+    blocks = [
+        (first, made.upper if body is upper else -made.lower)
+        for first, (upper, lower), made in zip(ends, sides, couplings)
+        if body is upper or body is lower
+    ]
+    width = blocks[0][1].shape[1]
+    entries = [(first, sp.coo_matrix(block)) for first, block in blocks]
+    rows = np.concatenate([first + block.row for first, block in entries])
+    columns = np.concatenate([block.col for _, block in entries])
+    values = np.concatenate([block.data for _, block in entries])
+    return sp.csr_matrix((values, (rows, columns)), (int(ends[-1]), width))
 
 
 def _pairs(scene: Scene, couplings: Sequence[Coupling]) -> tuple[Pair, ...]:
@@ -348,19 +351,17 @@ def _filling(maps: Sequence[sp.csr_matrix]) -> int:
 def _entries(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarray | sp.csr_array:
     """Q by its entries, symmetric to the last digit: an array, or sparse rows where most pairs share no body."""
     n = maps[0].shape[0]
-    thin = _filling(maps) < SPARSE * n**2
-    Q = sp.csr_array((n, n)) if thin else np.zeros((n, n))
-    for body, B in zip(bodies, maps):
-        if not body.moved(B).any():
-            continue
-        rows = _rows(B)
-        if thin:
-            place = np.repeat(rows, len(rows)), np.tile(rows, len(rows))
-            Q = Q + sp.csr_array((body.compliance(B[rows]).ravel(), place), (n, n))
-        elif len(rows) == n:
-            Q += body.compliance(B)
+    parts = [(_rows(B), body.compliance(B[_rows(B)])) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    if _filling(maps) < SPARSE * n**2:
+        rows = np.concatenate([np.repeat(rows, len(rows)) for rows, _ in parts])
+        columns = np.concatenate([np.tile(rows, len(rows)) for rows, _ in parts])
+        return sp.csr_array((np.concatenate([own.ravel() for _, own in parts]), (rows, columns)), (n, n))
+    Q = np.zeros((n, n))
+    for rows, own in parts:
+        if len(rows) == n:
+            Q += own
         else:
-            Q[np.ix_(rows, rows)] += body.compliance(B[rows])
+            Q[np.ix_(rows, rows)] += own
     return Q
 
 
