@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from contactopt.analysis.paths import PathResult, follow
     from contactopt.analytic import Reference
     from contactopt.bodies.fields import Fields
+    from contactopt.derivatives.interface import sensitivity
     from contactopt.errors import BackendError, InputError
     from contactopt.interface.reduction import reduce, reduce_bodies
     from contactopt.material import Material
@@ -37,6 +38,7 @@ _HOMES = {
     "analysis.diagnosis": ("Diagnosis", "diagnose"),
     "analysis.enumeration": ("all_solutions",),
     "analysis.paths": ("PathResult", "follow"),
+    "derivatives.interface": ("sensitivity",),
     "errors": ("BackendError", "InputError"),
     "bodies.fields": ("Fields",),
     "interface.reduction": ("reduce", "reduce_bodies"),
