@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from contactopt.analysis.paths import PathResult, follow
     from contactopt.analytic import Reference
     from contactopt.bodies.fields import Fields
+    from contactopt.derivatives.gradient import gradient
     from contactopt.derivatives.interface import sensitivity
     from contactopt.errors import BackendError, InputError
     from contactopt.interface.reduction import reduce, reduce_bodies
@@ -38,6 +39,7 @@ _HOMES = {
     "analysis.diagnosis": ("Diagnosis", "diagnose"),
     "analysis.enumeration": ("all_solutions",),
     "analysis.paths": ("PathResult", "follow"),
+    "derivatives.gradient": ("gradient",),
     "derivatives.interface": ("sensitivity",),
     "errors": ("BackendError", "InputError"),
     "bodies.fields": ("Fields",),
