@@ -26,9 +26,9 @@ CASES = {
         ("approach", "width"),
     ),
     "solid": (
-        lambda: scenes.make_scene("cattaneo-3d", elements=4),
-        ("nu:upper", "mu"),
-        ("shift",),
+        lambda: scenes.flat_punch(3, elements=3),
+        ("nu:punch", "mu"),
+        ("approach", "energy"),
     ),
     "half-spaces": (
         lambda: scenes.make_scene("cattaneo-half-space", elements=4),
@@ -88,34 +88,34 @@ def test_the_gradient_by_the_gap_and_the_friction_of_every_contact():
         assert abs(one.onesided({name: direction}) - wanted) < 1e-6 * abs(wanted)
 
 
-def loop(**changes):
+def loop():
     """Pressed, pushed forth, and half-way back: slip, stick and slip the other way."""
-    scene = scenes.make_scene("cattaneo-2d", elements=5, shear=0.0, **changes)
+    scene = scenes.make_scene("cattaneo-2d", elements=5, shear=0.0)
     push = parameter("force:upper:x", scene)
-    return [push.put(scene, shear) for shear in (0.0, 20.0, 40.0, 10.0, -25.0)]
+    return [push.put(scene, shear) for shear in (0.0, 40.0, -25.0)]
 
 
 def test_gradients_along_a_load_path_forward_and_adjoint():
-    states = loop()
-    names = ("E:lower", "mu", "nu:upper", "force:upper:x")
+    states, h = loop(), 1e-5
     result = follow(states, tol=1e-13)
-    for quantity in ("shift", "energy", "stick"):
-        one = contactopt.gradient(result, quantity, names)
-        for name in names:
-
-            def at(t, name=name, quantity=quantity):
-                changed = [
-                    which.put(scene, which.read(scene) + t) for scene in states for which in (parameter(name, scene),)
-                ]
-                return value(quantity, follow(changed, tol=1e-13))
-
-            h = 1e-5 * max(abs(parameter(name, states[-1]).read(states[-1])), 1.0)
-            wanted = (at(h) - at(-h)) / (2 * h)
+    names = ("E:lower", "mu")
+    read = {
+        "shift": lambda history: history["shift"][-1],
+        "energy": lambda history: history["elastic_energy"][-1],
+        "stick": lambda history: (history["stick_half_width"] / history["contact_half_width"])[-1],
+    }
+    found = {quantity: contactopt.gradient(result, quantity, names) for quantity in read}
+    for name in names:
+        which = parameter(name, states[0])
+        ends = [follow([which.put(s, which.read(s) + t) for s in states], tol=1e-13).history for t in (h, -h)]
+        for quantity, one in found.items():
+            assert one.value == pytest.approx(read[quantity](result.history), rel=1e-9)
+            wanted = (read[quantity](ends[0]) - read[quantity](ends[1])) / (2 * h)
             size = max(abs(wanted), 0.1 * abs(one.value))
             assert abs(one.by[name] - wanted) < 1e-6 * size, (quantity, name)
-            assert abs(one.onesided({name: 1.0}) - one.by[name]) < 1e-9 * size
-    middle = contactopt.gradient(result, "shift", "mu", state=2)
-    assert middle.value == pytest.approx(result.history["shift"][2])
+    shift = found["shift"]
+    assert shift.onesided({"mu": 1.0}) == pytest.approx(shift.by["mu"], rel=1e-9)
+    assert contactopt.gradient(result, "shift", "mu", state=1).value == pytest.approx(result.history["shift"][1])
 
 
 def test_resultants_and_functionals():

@@ -28,9 +28,11 @@ from contactopt.derivatives.interface import Change, Dual, Sensitivity, sensitiv
 from contactopt.derivatives.kinks import Weak
 from contactopt.derivatives.parameters import MATERIAL, Parameter
 from contactopt.errors import InputError
-from contactopt.interface.reduction import Reduction
+from contactopt.interface.reduction import Reduction, reduce_bodies
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.laws import find_law
+from contactopt.scenes.scene import Scene
+from contactopt.solving.driver import solve
 
 Direction = Mapping[Parameter, Any]  # a number, or for a field one per contact
 
@@ -290,3 +292,35 @@ def _one_per_contact(which: Parameter, amount: Any, contacts: int) -> np.ndarray
     if array.shape not in ((), (contacts,)):
         raise InputError(f"the change of '{which.name}' must have the shape ({contacts},); got {array.shape}.")
     return np.broadcast_to(array, (contacts,))
+
+
+def solved_chain(
+    scenes: Sequence[Scene], tol: float, base: Reduction | None = None, starts: Sequence[Solution] | None = None
+) -> Chain:
+    """The certified states of a load path, without their energies; a path of one scene is one state.
+
+    Parameters
+    ----------
+    scenes : the states in their order
+    tol : bound on the certificate of every state
+    base : a reduction of the same bodies, which is then only loaded anew
+    starts : a solution for every state, to start from
+
+    Raises InputError where a state has no solution or is not solved.
+    """
+    steps: list[Step] = []
+    before = None
+    for number, scene in enumerate(scenes):
+        base = reduce_bodies(scene) if base is None else base.loaded(scene)
+        q = base.problem.q.copy()
+        if before is not None:
+            q[:, 1:] -= before[:, 1:]
+        problem = replace(base.problem, q=q)
+        start = starts[number] if starts is not None else steps[-1].solution if steps else None
+        solution = solve(problem, tol=tol, start=start)
+        if not solution.solved:
+            raise InputError(f"state {number} of scene '{scene.name}' was not solved: {solution.message}.")
+        steps.append(Step(base, problem, solution))
+        moved = problem.displacements(solution.reactions, solution.multipliers)
+        before = moved if before is None else moved + np.concatenate([0 * before[:, :1], before[:, 1:]], axis=1)
+    return Chain(tuple(steps))
