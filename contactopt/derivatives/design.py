@@ -28,6 +28,7 @@ from contactopt.derivatives.states import Step
 from contactopt.errors import InputError
 from contactopt.interface.reduction import Reduction, reduce_bodies
 from contactopt.problem import Solution
+from contactopt.problem.operators import diagonal
 from contactopt.scenes.scene import Scene
 from contactopt.solving.driver import solve
 
@@ -38,6 +39,7 @@ logger = logging.getLogger(__name__)
 
 TAKEN, GOOD = 0.05, 0.7  # share of the promised gain from which on a step is taken, and the trust region grows
 SHRINK, GROW = 0.3, 2.0
+IDLE = 1e-10  # change of the forces, over what is usual, that is rounding
 FIRST = 0.1  # radius of the first trust region, in changes that move the pressure somewhere by the largest one
 SETTLED = 1e-6  # promised relative gain, and relative size of a trust region, at which the design ends
 
@@ -176,7 +178,7 @@ def design(
     visits.append(Visit(_peak(now), now.solution.residual, radius, True, len(now.sensitivity.weak)))
     slopes = states.slopes(now)
     steepest = np.abs(slopes / np.maximum(now.problem.areas, 1e-300)[:, None]).max(axis=0, initial=0.0)
-    if not np.all(steepest > 0):
+    if not np.all(np.abs(slopes).max(axis=0) > IDLE * _usual(states, now, x)):
         raise InputError("a shape or a free parameter does not change the pressure; leave it out.")
     sizes = _peak(now) / steepest  # each changes the pressure somewhere by as much as the largest
     while len(visits) < steps:
@@ -259,6 +261,14 @@ def _pressure(step: Step) -> np.ndarray:
 
 def _peak(step: Step) -> float:
     return float(_pressure(step).max(initial=0.0))
+
+
+def _usual(states: _States, now: Step, x: np.ndarray) -> np.ndarray:
+    """What each variable would change the forces by if every contact were on its own, for parameters in units of their own."""
+    compliance = float(np.mean(diagonal(now.problem.Q)))
+    rest = np.where(x[states.shapes.shape[1] :] != 0, np.abs(x[states.shapes.shape[1] :]), 1.0)
+    largest = float(np.abs(now.solution.reactions).max())
+    return np.concatenate([np.abs(states.shapes).max(axis=0, initial=0.0) / compliance, largest / rest])
 
 
 def _bounds(

@@ -93,7 +93,7 @@ class _Model:
         self, scenes: tuple[Scene, ...], which: tuple[Parameter, ...], data: dict[str, np.ndarray], tol: float
     ):
         self.scenes, self.which, self.data, self.tol = scenes, which, data, tol
-        self.measured = {name: np.flatnonzero(np.isfinite(values)) for name, values in data.items()}
+        self.measured = {name: np.flatnonzero(np.isfinite(values)).tolist() for name, values in data.items()}
         self.last: tuple[np.ndarray, Chain] | None = None
         self.certificates: list[float] = []
 
@@ -292,7 +292,8 @@ def _first(which: tuple[Parameter, ...], scenes: tuple[Scene, ...], start: Mappi
 def _noise(noise: float | Mapping[str, float] | None, data: dict[str, np.ndarray]) -> dict[str, float]:
     """quantity -> standard deviation, up to a common factor where it is to be estimated."""
     if noise is None:
-        return {name: float(np.sqrt(np.nanmean(values**2))) or 1.0 for name, values in data.items()}
+        known = {name: values[np.isfinite(values)] for name, values in data.items()}
+        return {name: float(np.linalg.norm(v)) / max(len(v), 1) ** 0.5 or 1.0 for name, v in known.items()}
     given = dict(noise) if isinstance(noise, Mapping) else dict.fromkeys(data, noise)
     for name in data:
         if name not in given:
