@@ -1,5 +1,6 @@
 import gc
 import resource
+import subprocess
 import sys
 import threading
 import time
@@ -335,3 +336,28 @@ def test_factors_are_freed_whatever_thread_made_them():
         sizes.append(resident())
     assert stored > 40
     assert sizes[-1] - sizes[3] < 2 * stored  # eight would be left
+
+
+def test_factors_may_be_freed_at_any_moment():
+    """The collector may free a solver while this very thread holds the locks of a pool that it is starting."""
+    program = """
+import gc
+from concurrent.futures import ThreadPoolExecutor
+import scipy.sparse as sp
+from contactopt.bodies.solvers.superlu import FactorThread
+
+class Prefix:
+    def __str__(self):  # asked for while the pool starts a thread
+        print("collected", gc.collect() > 0)
+        return "pool"
+
+gc.disable()
+thread = FactorThread()
+thread.factorise(sp.eye_array(3, format="csc"))
+thread.itself = thread  # only the collector finds out that nobody needs it
+del thread
+with ThreadPoolExecutor(1, thread_name_prefix=Prefix()) as pool:
+    assert pool.submit(abs, -1).result() == 1
+"""
+    ended = subprocess.run([sys.executable, "-c", program], timeout=60, check=True, capture_output=True, text=True)
+    assert "collected True" in ended.stdout

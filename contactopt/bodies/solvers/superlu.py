@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import weakref
+from _thread import start_new_thread
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
@@ -26,13 +28,15 @@ from contactopt.problem.operators import Product
 class FactorThread:
     """One thread that makes factors and frees them: SuperLU returns memory only in the thread that took it.
 
-    The thread ends, and its factors are freed, when nobody refers to this object any more.
+    The thread ends, and its factors are freed, when nobody refers to this object any more. Python may find that out
+    in the middle of any other operation of any thread, one that holds the locks of another pool, say. The thread is
+    therefore told by a thread of a moment's life, which may wait for these locks.
     """
 
     def __init__(self) -> None:
         self._executor = ThreadPoolExecutor(1, thread_name_prefix="superlu")
         self._held: list[Any] = []
-        weakref.finalize(self, _free, self._executor, self._held).atexit = False
+        weakref.finalize(self, start_new_thread, _free, (self._executor, self._held)).atexit = False
 
     def factorise(self, A: sp.csc_matrix) -> int:
         """Factorise A without a change of order and return the number under which [] finds the factors."""
@@ -45,7 +49,8 @@ class FactorThread:
 
 
 def _free(executor: ThreadPoolExecutor, held: list[Any]) -> None:
-    executor.submit(held.clear)
+    with suppress(RuntimeError):  # Python is ending: there is nothing left to free
+        executor.submit(held.clear)
     executor.shutdown(wait=False)
 
 
