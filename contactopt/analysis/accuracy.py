@@ -29,11 +29,10 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.constants import BELOW, FIRST, MOST_MEMORY, MOST_UNKNOWNS, SLOWEST, STUCK
-from contactopt.analysis.paths import PathResult, follow
+from contactopt.analysis.paths import solve_states
 from contactopt.analysis.progress import resident_memory
 from contactopt.analysis.quantities import QUANTITIES, at_rim, uncertainty
 from contactopt.analysis.solve_scene import Options, Solved
-from contactopt.analysis.zone import solve_zone
 from contactopt.bodies.refinement import split_scene
 from contactopt.checks import check_number
 from contactopt.errors import InputError
@@ -97,11 +96,10 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A scene solved on one mesh; `path` if the scene has a load path, whose last state it then is."""
+    """A scene solved on one mesh, or the last state of its load path."""
 
     level: Level
     solved: Solved
-    path: PathResult | None = None
 
     @property
     def reduction(self) -> Reduction:
@@ -316,15 +314,10 @@ class _Search:
         begin = time.perf_counter()
         base = elements if self.given else elements // 2**splits
         states = [split_scene(scene, base, splits) for scene in self.states]
-        path, options = None, self.options
-        if len(states) > 1:
-            path = follow(states, elements, Q=options.Q, solver=options.solver, **options.of_solve)
-            solved = Solved(path.reduction, path.solution)
-        else:
-            solved = solve_zone(states[0], elements, options, None if self.last is None else self.last.solved)
+        solved = solve_states(states, elements, self.options, None if self.last is None else self.last.solved)
         reduction, solution, zones = solved.reduction, solved.solution, solved.zones
         value = QUANTITIES[self.quantity](reduction, solution), uncertainty(self.quantity, reduction, solution)
         size = reduction.dofs, reduction.problem.contacts, max(1, len(zones) - 1), zones[-2] if zones else None
         self.levels.append(Level(elements, splits, *size, *value, time.perf_counter() - begin))
         self.each = (resident_memory() - self.before) / (self._held() + reduction.dofs)
-        return Mesh(self.levels[-1], solved, path)
+        return Mesh(self.levels[-1], solved)

@@ -37,6 +37,7 @@ from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
 from contactopt.problem.operators import (
     FORMS,
+    Interface,
     InterfaceOperator,
     Product,
     check_dense,
@@ -121,9 +122,7 @@ class Reduction:
         _check_same(self.scene, scene)
         start = time.perf_counter()
         bodies = tuple(old.loaded(scene, part) for old, part in zip(self.bodies, scene.parts))
-        q, V, s = _linear_terms(bodies, self.maps, self.couplings)
-        law = _law(scene.pairs, self.couplings)
-        problem = replace(self.problem, q=q, V=V, s=s, law=law, motions=_names(bodies))
+        problem = _problem(scene, self.problem.Q, bodies, self.maps, self.couplings)
         seconds = {"load": time.perf_counter() - start}
         return replace(self, scene=scene, problem=problem, bodies=bodies, seconds=seconds)
 
@@ -251,14 +250,8 @@ def reduce_bodies(
     seconds["factorise"] = time.perf_counter() - start
 
     start = time.perf_counter()
-    q, V, s = _linear_terms(bodies, maps, coupled)
     made = _operator(bodies, maps, coupled) if Q == "implicit" else _entries(bodies, maps)
-    areas = np.concatenate([part.areas for part in coupled])
-    points = np.concatenate([part.positions for part in coupled], axis=1)
-    pairs = _pairs(scene, coupled)
-    chart = pairs[0].chart if len(pairs) == 1 else None
-    law, names = _law(scene.pairs, coupled), _names(bodies)
-    problem = InterfaceProblem(made, q, law, V, s, areas, points, chart, pairs, names)
+    problem = _problem(scene, made, bodies, maps, coupled)
     seconds["compliance"] = time.perf_counter() - start
     return Reduction(scene, problem, bodies, maps, coupled, seconds)
 
@@ -365,14 +358,19 @@ def _entries(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarra
     return Q
 
 
-def _linear_terms(
-    bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q (k, dim), V (k dim, p) and s (p,)."""
+def _problem(
+    scene: Scene, Q: Interface, bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
+) -> InterfaceProblem:
+    """The interface problem of a scene whose bodies and couplings are made and whose Q is known."""
     gap = np.concatenate([made.gap for made in couplings])
     q = np.zeros((len(gap), maps[0].shape[0] // max(len(gap), 1)))
     q[:, 0] = gap
     for body, B in zip(bodies, maps):
         q += (B @ body.at_rest).reshape(q.shape)
     V = np.concatenate([B @ body.motions for body, B in zip(bodies, maps)], axis=1)
-    return q, V, np.concatenate([body.resultants for body in bodies])
+    s = np.concatenate([body.resultants for body in bodies])
+    areas = np.concatenate([made.areas for made in couplings])
+    points = np.concatenate([made.positions for made in couplings], axis=1)
+    pairs = _pairs(scene, couplings)
+    chart = pairs[0].chart if len(pairs) == 1 else None
+    return InterfaceProblem(Q, q, _law(scene.pairs, couplings), V, s, areas, points, chart, pairs, _names(bodies))
