@@ -308,7 +308,9 @@ def _operator(
     if kernels and all(kernel is not None for kernel in kernels):
         known = [kernel for kernel in kernels if kernel is not None]
         if len({kernel.padded for kernel in known}) > 1:
-            raise InputError("one half-space repeats itself periodically and the other does not; make both periodic or none.")
+            raise InputError(
+                "one half-space repeats itself periodically and the other does not; make both periodic or none."
+            )
         return Convolution(sum(known[1:], known[0]))
     moved = [body.moved(B) for body, B in zip(bodies, maps)]
     moving = [(body, B, _rows(B)) for body, B, moves in zip(bodies, maps, moved) if moves.any()]
