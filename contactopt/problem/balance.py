@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.optimize import linprog, nnls
 
 from contactopt.problem.interface_problem import InterfaceProblem
 
@@ -78,6 +77,8 @@ def _ways(dim: int) -> np.ndarray:
 
 def _balanced(problem: InterfaceProblem, s: np.ndarray) -> bool:
     """Whether forces in polygons inside the cones are found that balance the loads, by nonnegative least squares."""
+    from scipy.optimize import nnls
+
     k, d = problem.q.shape
     blocks = problem.V.reshape(k, d, -1)
     edges = [blocks[:, 0] + problem.mu[:, None] * np.einsum("d,kdp->kp", way, blocks[:, 1:]) for way in _ways(d)]
@@ -94,6 +95,8 @@ def _balanced(problem: InterfaceProblem, s: np.ndarray) -> bool:
 
 def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.ndarray | None:
     """min |z|_1 over motions with s' z = 1 and V z in a polygon inside each dual cone; None if there are none."""
+    from scipy.optimize import linprog
+
     k, d = problem.q.shape
     normal = np.arange(k) * d
     ways, factor = _ways(d), 1.0 if d == 2 else 1 / np.cos(np.pi / DIRECTIONS)
