@@ -68,7 +68,9 @@ def test_show_says_what_a_scene_is(name, capsys):
     assert cli.main(["show", name]) == 0
     text = capsys.readouterr().out
     assert SCENES[name][2] in text and "arguments" in text and "source: contactopt/scenes/" in text
-    assert {"punch-2d": "nothing is known exactly", "pin-in-bush": "known exactly: Persson", "rough": "7 states"}[name] in text
+    assert {"punch-2d": "nothing is known exactly", "pin-in-bush": "known exactly: Persson", "rough": "7 states"}[
+        name
+    ] in text
 
 
 def test_the_sketch_has_the_proportions_of_the_scene(capsys):
@@ -90,8 +92,10 @@ def test_show_reads_a_scene_file(tmp_path, capsys):
 def test_bash_completes_commands_options_and_scenes():
     def complete(*words):
         line = " ".join(f"'{word}'" for word in ("contactopt", *words))
-        code = f'{script(cli.make_parser(), "bash")}\nCOMP_WORDS=({line}); COMP_CWORD={len(words)}; _contactopt'
-        done = subprocess.run(["bash", "-c", code + '; echo "${COMPREPLY[@]}"'], capture_output=True, text=True, check=True)
+        code = f"{script(cli.make_parser(), 'bash')}\nCOMP_WORDS=({line}); COMP_CWORD={len(words)}; _contactopt"
+        done = subprocess.run(
+            ["bash", "-c", code + '; echo "${COMPREPLY[@]}"'], capture_output=True, text=True, check=True
+        )
         return done.stdout.split()
 
     assert complete("sh") == ["show"]

@@ -146,7 +146,9 @@ class Diagnosis:
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        guaranteed = f"unique below mu = {self.guaranteed.unique:.3g}" if self.guaranteed.unique else "uniqueness not guaranteed"
+        guaranteed = (
+            f"unique below mu = {self.guaranteed.unique:.3g}" if self.guaranteed.unique else "uniqueness not guaranteed"
+        )
         contacts = f"{count(self.contacts, 'contact')} in {self.dim}D"
         return line("Diagnosis", contacts, f"mu = {self.mu:g}", f"rank {self.rank} of {self.size}", guaranteed)
 

@@ -176,7 +176,11 @@ def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
     filled = sorted(boundary for boundary, facets in known.items() if len(facets))
     for name in names:
         if name not in filled:
-            wrong = f"boundary {name!r} has no facets in this mesh" if name in known else f"the mesh has no boundary named {name!r}"
+            wrong = (
+                f"boundary {name!r} has no facets in this mesh"
+                if name in known
+                else f"the mesh has no boundary named {name!r}"
+            )
             raise InputError(f"body '{part.name}': {wrong}; it has {', '.join(filled) or 'none'}.")
 
 

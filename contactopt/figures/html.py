@@ -68,7 +68,9 @@ def write_html(file: str | Path, title: str, body: str, data: Mapping[str, Any],
         body,
         f'<script type="application/json" id="data">{encoded}</script>',
         f'<script type="text/plain" id="plotly">{plotly}</script>',
-        f"<script>{texts['start.js']}\nstart(() => {{\n" + "\n".join(texts[name] for name in programs) + "\n});</script>",
+        f"<script>{texts['start.js']}\nstart(() => {{\n"
+        + "\n".join(texts[name] for name in programs)
+        + "\n});</script>",
         "</body></html>\n",
     ]
     with whole_file(file) as beside:

@@ -76,7 +76,9 @@ def write(result: Result, folder: Path) -> None:
         r_t=squeeze(r[:, 1:]),
         pressure=result.pressure,
         traction=result.traction,
-        bound=np.divide(bound, problem.areas, out=np.zeros_like(bound), where=problem.areas > 0),  # of friction [stress]
+        bound=np.divide(
+            bound, problem.areas, out=np.zeros_like(bound), where=problem.areas > 0
+        ),  # of friction [stress]
         status=status.stick + 2 * status.slip,  # 0 open, 1 stick, 2 slip
     )
     if result.path is not None:

@@ -21,6 +21,8 @@ from contactopt.figures.html import check_installed, packed, write_html
 
 __all__ = ["check_installed", "write_page"]
 SHARE = 0.08  # of the bodies' size that the largest displacement is drawn as, at first
+APART = 1e-3  # a gap above this fraction of the largest displacement: bodies that were apart would seem to overlap if magnified
+REACH = 4.0  # sizes of a small contact surface that the first picture of large bodies shows
 TOP = 0.998  # quantile of the von Mises stress where the colours end: singular corners would take them all
 CORNERS = {  # corners of a cell's faces, in the numbering of VTU files
     "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
@@ -71,9 +73,13 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
     path = dict(np.load(folder / "path.npz")) if (folder / "path.npz").exists() else None
     pairs = {name: meshes[f"contact-{name}"] for name in summary["pairs"]}
     places = np.concatenate([mesh.points for mesh in (*bodies.values(), *pairs.values())])
-    size = float(np.ptp(places, axis=0).max()) or 1.0
+    low, high = places.min(axis=0), places.max(axis=0)
+    near = _near_contact([mesh.points for mesh in pairs.values()], low, high)
     moves = [np.abs(mesh.point_data["displacement"]).max() for mesh in bodies.values()]
     largest = float(max(moves, default=0.0))
+    apart = max(float(mesh.point_data["contact_gap"].max()) for mesh in pairs.values()) > APART * largest
+    reach = float(np.ptp(near, axis=0).max())
+    visible = _round(SHARE * reach / largest) if largest > 0 else 1.0
     contacts, first = [], 0
     for name, mesh in pairs.items():
         own = slice(first, first + len(mesh.points))
@@ -85,14 +91,27 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         "units": summary["units"],
         "dim": len(axes),
         "axes": axes,
-        "size": size,
-        "scale": _round(SHARE * size / largest) if largest > 0 else 1.0,
+        "box": [low.tolist(), high.tolist()],
+        "near": near.tolist(),
+        "scale": 1.0 if apart else max(1.0, visible),
+        "most_scale": 2.0 * max(1.0, visible),
         "top": float(np.quantile(np.concatenate(stresses), TOP)) if stresses else 1.0,
         "bodies": [{"name": name} | _body_arrays(mesh, axes) for name, mesh in bodies.items()],
         "contacts": contacts,
         "states": 1 if path is None else len(path["reactions"]),
         "history": None if path is None else _history(folder / "history.csv"),
     }
+
+
+def _near_contact(surfaces: list[np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Least and largest coordinates (2, 3) of the first picture: all bodies, or the contact if it is small on them."""
+    points = np.concatenate(surfaces)
+    least, most = points.min(axis=0), points.max(axis=0)
+    half = REACH * float((most - least).max()) / 2
+    if half <= 0 or half > float((high - low).max()) / 4:
+        return np.array([low, high])
+    centre = (least + most) / 2
+    return np.array([np.maximum(low, centre - half), np.minimum(high, centre + half)])
 
 
 def _round(value: float) -> float:
@@ -104,7 +123,9 @@ def _round(value: float) -> float:
 def _body_arrays(mesh: Any, axes: list[str]) -> dict[str, Any]:
     """The surface of a body, in 2D all of it, with its values at the nodes that are drawn."""
     (block,) = mesh.cells
-    faces = np.concatenate([block.data[:, list(face)] for face in CORNERS[block.type]]) if block.dim == 3 else block.data
+    faces = (
+        np.concatenate([block.data[:, list(face)] for face in CORNERS[block.type]]) if block.dim == 3 else block.data
+    )
     if block.dim == 3:
         faces = _once(faces)
     nodes, faces = np.unique(faces, return_inverse=True)
@@ -221,7 +242,7 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
         for name, sign, words in (
             ("left", "&larr;", f"{what} left"), ("right", "&rarr;", f"{what} right"), ("up", "&uarr;", f"{what} up"),
             ("down", "&darr;", f"{what} down"), ("closer", "+", "closer"), ("farther", "&minus;", "farther away"),
-            ("home", "whole view", "whole view"),
+            ("home", "all", "show all of the bodies"), ("near", "contact", "show the contact"),
         )
     )  # fmt: skip
     return f"""<header><h1>{html.escape(summary["scene"])}</h1>

@@ -49,7 +49,9 @@ def describe(name: str, changes: dict[str, Any]) -> str:
     for part in scene.parts:
         lines += _part_lines(scene, part, meshes.get(part.name))
     images = f"; {scene.copies} mirror images make the whole" if scene.copies > 1 else ""
-    lines.append(f"{count(len(scene.pairs), 'pair')} of surfaces: {', '.join(pair.name for pair in scene.pairs)}{images}")
+    lines.append(
+        f"{count(len(scene.pairs), 'pair')} of surfaces: {', '.join(pair.name for pair in scene.pairs)}{images}"
+    )
     if len(states) > 1:
         lines.append(f"load path of {len(states)} states")
     exact = "nothing is known exactly" if scene.reference is None else f"known exactly: {scene.reference.label}"

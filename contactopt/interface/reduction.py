@@ -62,7 +62,10 @@ class Reduction:
     seconds: dict[str, float]
 
     def __repr__(self) -> str:
-        unknowns, pairs = count(self.dofs, "unknown"), count(len(self.couplings), "pair of surfaces", "pairs of surfaces")
+        unknowns, pairs = (
+            count(self.dofs, "unknown"),
+            count(len(self.couplings), "pair of surfaces", "pairs of surfaces"),
+        )
         return line("Reduction", self.scene.name, unknowns, count(self.problem.contacts, "contact"), pairs)
 
     def _repr_html_(self) -> str:

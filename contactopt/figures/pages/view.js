@@ -14,7 +14,7 @@ const CONTACT = {
   gap: ["gap", LENGTH], slip: ["size of the slip", LENGTH],
 };
 const STATUS = ["open", "stick", "slip"];
-const now = {field: "von_mises", scale: data.scale, contact: "pressure", state: data.states - 1, arrows: true, clear: false, edges: flat, probe: null};
+const now = {field: "von_mises", scale: data.scale, contact: "pressure", state: data.states - 1, arrows: true, clear: false, edges: flat, probe: null, box: data.near, zoom: 1};
 const view = document.getElementById("view");
 const control = (name) => document.getElementById(name);
 
@@ -105,11 +105,12 @@ function arrows(pair, xyz) {
   const force = pair.states.vector, status = state(pair, "status");
   const touching = [...status.keys()].filter((i) => status[i] > 0), every = Math.ceil(touching.length / 400);
   const largest = Math.max(...touching.map((i) => Math.hypot(force[3 * i], force[3 * i + 1], force[3 * i + 2])), 1e-300);
+  const arrowLength = 0.15 * Math.max(...now.box[0].map((low, c) => now.box[1][c] - low));
   const made = [[], [], []], tips = [[], [], []];
   for (let n = 0; n < touching.length; n += every) {
     const i = touching[n];
     for (let c = 0; c < 3; c++) {
-      const tip = xyz[c][i] + (0.15 * data.size * force[3 * i + c]) / largest;
+      const tip = xyz[c][i] + (arrowLength * force[3 * i + c]) / largest;
       made[c].push(xyz[c][i], tip, null);
       tips[c].push(tip);
     }
@@ -117,7 +118,7 @@ function arrows(pair, xyz) {
   const common = {hoverinfo: "skip", showlegend: false, type: "scatter3d"};
   return [
     {...common, mode: "lines", x: made[0], y: made[1], z: made[2], line: {color: "#000", width: 3}},
-    {...common, mode: "markers", x: tips[0], y: tips[1], z: tips[2], marker: {size: 2.5, color: "#000"}},
+    {...common, mode: "markers", x: tips[0], y: tips[1], z: tips[2], marker: {size: flat ? 4 : 2.5, color: "#000"}},
   ];
 }
 
@@ -130,12 +131,27 @@ function probeTrace() {
 }
 
 const axis = (name) => ({title: {text: plain(`${name} [${LENGTH}]`)}, showbackground: false, zeroline: false, showspikes: false});
-const HOME = flat ? {eye: {x: 0, y: 0, z: 2.2}, up: {x: 0, y: 1, z: 0}} : {eye: {x: -1.1, y: -1.5, z: 0.7}, up: {x: 0, y: 0, z: 1}};
+const HOME = flat ? {eye: {x: 0, y: 0, z: 2.2}, up: {x: 0, y: 1, z: 0}, center: {x: 0, y: 0, z: 0}} : {eye: {x: -1.1, y: -1.5, z: 0.7}, up: {x: 0, y: 0, z: 1}, center: {x: 0, y: 0, z: 0}};
+const MARGIN = 0.05;  // of the size of the box, about it
+const FRONT = 0.54;
+
+function boxed() {  // ranges of the axes, and the size of the picture: in a parallel projection that of the aspect ratio
+  const [low, high] = now.box, size = Math.max(...low.map((value, c) => high[c] - value)), rim = MARGIN * size, made = {"scene.aspectmode": "manual"};
+  // In the front view one unit of the aspect ratio is about FRONT of the height between the colour bars.
+  const height = view.clientHeight - 120, share = low.map((value, c) => (high[c] - value) / size + 2 * MARGIN);
+  const tall = flat ? Math.min(0.85 / share[1], (0.8 * view.clientWidth) / height / share[0]) / FRONT : Math.min(1.6, (2 * view.clientWidth) / height);
+  ["x", "y", "z"].forEach((name, c) => {
+    const thin = flat && c === 2, a = thin ? -size / 10 : low[c] - rim, b = thin ? size / 10 : high[c] + rim;
+    made[`scene.${name}axis.range`] = [a, b];
+    made[`scene.aspectratio.${name}`] = (now.zoom * tall * (b - a)) / size;
+  });
+  return made;
+}
 const layout = {
   margin: {l: 0, r: 0, t: 50, b: 70}, showlegend: false, uirevision: "kept",
   scene: {
-    aspectmode: "data", dragmode: flat ? "pan" : "orbit", xaxis: axis(data.axes[0]), yaxis: axis(data.axes[1]),
-    zaxis: flat ? {visible: false, range: [-data.size / 4, data.size / 4]} : axis(data.axes[2]),
+    dragmode: flat ? "pan" : "orbit", xaxis: axis(data.axes[0]), yaxis: axis(data.axes[1]),
+    zaxis: flat ? {visible: false} : axis(data.axes[2]),
     camera: {...HOME, projection: {type: "orthographic"}},
   },
 };
@@ -171,28 +187,29 @@ function probe(place) {
 function turn(about, up, closer) {
   const camera = structuredClone(view.layout.scene.camera), {x, y, z} = camera.eye, distance = Math.hypot(x, y, z) * closer;
   if (flat) {
-    camera.eye = {x, y, z: z * closer};
     const step = 0.1, centre = camera.center || {x: 0, y: 0, z: 0};
     camera.center = {x: centre.x - about * step, y: centre.y + up * step, z: centre.z};
-    camera.eye.x = camera.center.x; camera.eye.y = camera.center.y;
+    camera.eye = {x: camera.center.x, y: camera.center.y, z};
   } else {
     const angle = Math.atan2(y, x) + (about * Math.PI) / 12;
     const height = Math.max(-1.5, Math.min(1.5, Math.asin(z / Math.hypot(x, y, z)) + (up * Math.PI) / 12));
     camera.eye = {x: distance * Math.cos(height) * Math.cos(angle), y: distance * Math.cos(height) * Math.sin(angle), z: distance * Math.sin(height)};
   }
-  if (flat || closer !== 1) layoutScale(closer);
-  Plotly.relayout(view, {"scene.camera": camera});
+  now.zoom /= closer;
+  Plotly.relayout(view, {"scene.camera": camera, ...boxed()});
 }
 
-function layoutScale(closer) {  // in a parallel projection the size of the picture is that of the aspect ratio
-  const ratio = view._fullLayout.scene.aspectratio;
-  Plotly.relayout(view, {"scene.aspectmode": "manual", "scene.aspectratio": {x: ratio.x / closer, y: ratio.y / closer, z: ratio.z / closer}});
+function show(box) {
+  now.box = box;
+  now.zoom = 1;
+  draw();
+  Plotly.relayout(view, {"scene.camera": {...HOME, projection: {type: "orthographic"}}, ...boxed()});
 }
 
 function drawContact() {
   const chart = control("contact-chart"), pair = contacts[Number(control("pair").value) || 0];
   if (!pair) return;
-  const status = state(pair, "status"), pressure = state(pair, "pressure"), common = {margin: {l: 60, r: 15, t: 30, b: 50}, legend: {orientation: "h", y: 1.12}, uirevision: "kept"};
+  const status = state(pair, "status"), pressure = state(pair, "pressure"), common = {margin: {l: 60, r: 15, t: 30, b: 95}, legend: {orientation: "h", y: -0.25, yanchor: "top"}, uirevision: "kept"};
   const words = [...status].map((value) => STATUS[value]);
   if (!flat) {
     const [name, unit] = CONTACT[now.contact], count = pair.points.length / 3;
@@ -254,7 +271,7 @@ for (const name of ["arrows", "clear", "edges"]) {
   control(name).addEventListener("change", () => { now[name] = control(name).checked; draw(); });
 }
 const slider = control("scale");
-slider.max = 2 * data.scale; slider.step = data.scale / 50; slider.value = data.scale;
+slider.max = data.most_scale; slider.step = data.most_scale / 100; slider.value = data.scale;
 const times = () => { control("scale-words").textContent = `displacements x ${number(now.scale)}`; };
 slider.addEventListener("input", () => { now.scale = Number(slider.value); times(); draw(); });
 times();
@@ -266,7 +283,8 @@ if (data.history) {
 if (!bodies.length) control("body-controls").hidden = true;
 for (const [id, ...move] of [["left", -1, 0, 1], ["right", 1, 0, 1], ["up", 0, 1, 1], ["down", 0, -1, 1], ["closer", 0, 0, 0.8], ["farther", 0, 0, 1.25]])
   control(id).addEventListener("click", () => turn(...move));
-control("home").addEventListener("click", () => Plotly.relayout(view, {"scene.camera": {...HOME, projection: {type: "orthographic"}}, "scene.aspectmode": "data"}));
+control("home").addEventListener("click", () => show(data.box));
+control("near").addEventListener("click", () => show(data.near));
 const KEYS = {ArrowLeft: [-1, 0, 1], ArrowRight: [1, 0, 1], ArrowUp: [0, 1, 1], ArrowDown: [0, -1, 1], "+": [0, 0, 0.8], "=": [0, 0, 0.8], "-": [0, 0, 1.25]};
 view.addEventListener("keydown", (event) => { if (KEYS[event.key]) { turn(...KEYS[event.key]); event.preventDefault(); } });
 control("largest").addEventListener("click", () => {
@@ -282,6 +300,7 @@ control("peak").addEventListener("click", () => {
   draw();
 });
 everything();
+show(now.box);
 view.on("plotly_click", ({points: [point]}) => {
   if (point.data.meta) { probe({...point.data.meta, node: point.pointNumber}); draw(); }
 });
