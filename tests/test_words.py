@@ -29,16 +29,16 @@ def test_an_object_says_in_one_line_what_it_is(result):
 
 
 def test_a_notebook_shows_a_table_with_all_names_escaped(result):
-    class Reader(html.parser.HTMLParser):
-        tags = set()
+    found = set()
 
+    class Reader(html.parser.HTMLParser):
         def handle_starttag(self, tag, attrs):
-            self.tags.add(tag)
+            found.add(tag)
 
     hostile = replace(result, scene=replace(result.scene, name="<script>alert(1)</script>"))
     for one in (hostile, result.solution, result.problem, result.reduction, diagnose(result.problem, result.solution)):
         Reader().feed(one._repr_html_())
-    assert Reader.tags == {"table", "caption", "tbody", "tr", "th", "td"}
+    assert found == {"table", "caption", "tbody", "tr", "th", "td"}
     assert "&lt;script&gt;" in hostile._repr_html_() and "&lt;b&gt;" in card("x", {"<b>": 1})
 
 

@@ -41,7 +41,7 @@ def describe(name: str, changes: dict[str, Any]) -> str:
     scene = states[-1]
     length, stress = scene.units
     lines = [*head, f"kind {scene.kind}, lengths in {length}, stresses in {stress}; {scene.friction}", ""]
-    meshes = {part.name: part.build_mesh(min(scene.elements, 8), scene.zone) for part in scene.parts if _meshed(part)}
+    meshes = {part.name: part.build_mesh(min(scene.elements, 8), scene.zone) for part in scene.parts if isinstance(part, Part)}
     if meshes:
         lines += [*sketch(list(meshes.values())), ""]
         lines[-1] = "  ".join(f"{mark} {part}" for mark, part in zip(MARKS, meshes)) + _section(scene)
@@ -58,13 +58,9 @@ def describe(name: str, changes: dict[str, Any]) -> str:
     return "\n".join([*lines, exact, *arguments])
 
 
-def _meshed(part: Any) -> bool:
-    return isinstance(part, Part)
-
-
 def _argument_lines(name: str) -> list[str]:
     """The docstring of the function that makes the scene, and its arguments with their values; those of its load path, too."""
-    module, function = SCENES[name][:2]
+    module = SCENES[name][0]
     fixed = SCENES[name][-1] if isinstance(SCENES[name][-1], dict) else {}
     entries = [PATHS[name], SCENES[name]] if name in PATHS else [SCENES[name]]
     makers = [getattr(import_module(f"contactopt.scenes.{entry[0]}"), entry[1]) for entry in entries]
