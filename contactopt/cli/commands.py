@@ -140,6 +140,7 @@ def new(options: argparse.Namespace) -> int:
 
 def bench(options: argparse.Namespace) -> int:
     from contactopt.benchmark.campaign import run_campaign
+    from contactopt.benchmark.page import refusals, report_campaign
     from contactopt.benchmark.store import load
 
     try:
@@ -156,14 +157,26 @@ def bench(options: argparse.Namespace) -> int:
         print("contactopt: interrupted; finished runs are kept, go on with --resume", file=sys.stderr)
         return 130
     table = load(folder)
-    print(f"{len(table)} runs: " + ", ".join(f"{n} {status}" for status, n in table["status"].value_counts().items()))
+    runs = count(len(table), "run")
+    print(f"{runs}: " + ", ".join(f"{n} {status}" for status, n in table["status"].value_counts().items()))
+    for sentence in refusals(table):
+        print(f"  {sentence}")
     print(f"results in {folder}: rows.parquet (read them with contactopt.benchmark.load)")
+    page = report_campaign(folder, options.file)
+    more = "" if page.suffix == ".html" else "; a page to explore needs: pip install 'contactopt[view]'"
+    print(f"report: {page}{more}")
     return 0
 
 
 def report(options: argparse.Namespace) -> int:
     from contactopt.benchmark.campaign import run_reports
+    from contactopt.benchmark.page import report_campaign
 
+    folders = [Path(name) for name in options.names if Path(name).is_dir() and any(Path(name).glob("rows.*"))]
+    if folders and len(folders) == len(options.names) and not options.run:
+        for folder in folders:
+            print(f"report: {report_campaign(folder)}")
+        return 0
     paths = sorted(Path(options.experiments).glob("*.toml"))
     page = run_reports(paths, options.reports, options.run, options.names, options.jobs)
     print(f"reports in {page.parent}, all of them in {page}")

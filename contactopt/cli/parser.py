@@ -109,7 +109,12 @@ def _bench(bench: argparse.ArgumentParser) -> None:
 
 
 def _report(report: argparse.ArgumentParser) -> None:
-    report.add_argument("names", nargs="*", metavar="NAME", help="of the experiments to run (all)")
+    report.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="of the experiments to run (all), or folders of finished campaigns, whose reports are written into them",
+    )
     report.add_argument("--experiments", default="experiments/campaigns", metavar="DIR", help="(experiments/campaigns)")
     report.add_argument("--reports", default="reports", metavar="DIR", help="where tables and reports are (reports)")
     report.add_argument(

@@ -41,7 +41,9 @@ def describe(name: str, changes: dict[str, Any]) -> str:
     scene = states[-1]
     length, stress = scene.units
     lines = [*head, f"kind {scene.kind}, lengths in {length}, stresses in {stress}; {scene.friction}", ""]
-    meshes = {part.name: part.build_mesh(min(scene.elements, 8), scene.zone) for part in scene.parts if isinstance(part, Part)}
+    meshes = {
+        part.name: part.build_mesh(min(scene.elements, 8), scene.zone) for part in scene.parts if isinstance(part, Part)
+    }
     if meshes:
         lines += [*sketch(list(meshes.values())), ""]
         lines[-1] = "  ".join(f"{mark} {part}" for mark, part in zip(MARKS, meshes)) + _section(scene)
