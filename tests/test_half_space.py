@@ -282,7 +282,9 @@ def oval(turned=False, away=0.0, length=1.0, force=1.0):
         rows, along = rows[::-1], {"y": 0.4 * force}
     centre = np.array([-away, away] if turned else [away, -away])[:, None]
     radii = np.array([25.0, 20.0] if turned else [20.0, 25.0])[:, None] * length
-    rigid = Rigid("oval", gap=lambda x: np.sum((x[:2] - centre) ** 2 / radii, axis=0), force={"z": -3.0 * force} | along)
+    rigid = Rigid(
+        "oval", gap=lambda x: np.sum((x[:2] - centre) ** 2 / radii, axis=0), force={"z": -3.0 * force} | along
+    )
     material = Material(STEEL.E * force / length**2, STEEL.nu)
     scene = Scene("oval", rigid, HalfSpace("base", material, rows), 0.3, kind="solid")
     solution = contactopt.solve(contactopt.reduce(scene), tol=1e-10)

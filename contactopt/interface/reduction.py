@@ -26,6 +26,7 @@ import scipy.sparse as sp
 from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
 from contactopt.bodies.protocol import AssembledBody, Body
+from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
@@ -68,6 +69,21 @@ class Reduction:
     maps: tuple[sp.csr_matrix, ...]
     couplings: tuple[Coupling, ...]
     seconds: dict[str, float]
+
+    def __repr__(self) -> str:
+        unknowns, pairs = (
+            count(self.dofs, "unknown"),
+            count(len(self.couplings), "pair of surfaces", "pairs of surfaces"),
+        )
+        return line("Reduction", self.scene.name, unknowns, count(self.problem.contacts, "contact"), pairs)
+
+    def _repr_html_(self) -> str:
+        rows: dict[str, object] = {"scene": self.scene.name, "kind": self.scene.kind}
+        for body in self.bodies:
+            rows[f"body {body.name}"] = count(body.unknowns, "unknown")
+        for pair, coupling in zip(self.problem.pairs, self.couplings):
+            rows[f"surfaces {pair.name}"] = f"{count(len(coupling.gap), 'contact')}, coupled by {coupling.kind}"
+        return card("Reduction", rows)
 
     @property
     def coupling(self) -> Coupling:
@@ -308,7 +324,9 @@ def _operator(
     if kernels and all(kernel is not None for kernel in kernels):
         known = [kernel for kernel in kernels if kernel is not None]
         if len({kernel.padded for kernel in known}) > 1:
-            raise InputError("one half-space repeats itself periodically and the other does not; make both periodic or none.")
+            raise InputError(
+                "one half-space repeats itself periodically and the other does not; make both periodic or none."
+            )
         return Convolution(sum(known[1:], known[0]))
     moved = [body.moved(B) for body, B in zip(bodies, maps)]
     moving = [(body, B, _rows(B)) for body, B, moves in zip(bodies, maps, moved) if moves.any()]

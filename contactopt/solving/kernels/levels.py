@@ -356,7 +356,7 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
         for shift, share in zip(shifts, shares)
         if share.any()
     ]
-    free = turned(1 - sum(shares))
+    free = turned(np.asarray(1 - sum(shares)))
 
     def apply(x: np.ndarray) -> np.ndarray:
         parts = x.reshape(c, m)

@@ -11,7 +11,6 @@ from contactopt import HalfSpace, Material, Rigid, Scene, Solution, run, scenes,
 from contactopt.analytic import contact_modulus, hertz_line, hertz_point
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
 from contactopt.interface.reduction import reduce_bodies
-from contactopt.scenes.scene import Part
 from experiments.questions.half_spaces.measured import Row, cpu
 
 MATERIAL = Material(5.0, 0.3)
@@ -25,7 +24,9 @@ def chart_rows() -> list[Row]:
     """Hertz's pressure by finite elements and by half-spaces: error in L2 over CPU seconds."""
     rows = []
     for elements in (8, 16, 32, 64):
-        rows.append(_pressure_error("finite elements, axisymmetric", scenes.sphere(rigid="sphere", mu=0.0, elements=elements)))
+        rows.append(
+            _pressure_error("finite elements, axisymmetric", scenes.sphere(rigid="sphere", mu=0.0, elements=elements))
+        )
     for elements in (4, 6):
         rows.append(_pressure_error("finite elements, 3D", scenes.cattaneo(3, shear=0.0, mu=0.1, elements=elements)))
     for elements in (8, 16, 32, 64, 128):
@@ -39,7 +40,9 @@ def _line(elements: int) -> Scene:
     half = int(1.25 * elements)
     x = (np.arange(-half, half) + 0.5) * exact.half_width / elements
     rigid = Rigid("cylinder", gap=lambda p: p[0] ** 2 / (2 * RADIUS), force={"y": -1.0})
-    return Scene("line", rigid, HalfSpace("half-plane", MATERIAL, x), 0.0, law="frictionless", elements=elements, reference=exact)
+    return Scene(
+        "line", rigid, HalfSpace("half-plane", MATERIAL, x), 0.0, law="frictionless", elements=elements, reference=exact
+    )
 
 
 def _pressure_error(name: str, scene: Scene) -> Row:
@@ -67,7 +70,9 @@ def limit_rows() -> list[Row]:
     exact = hertz_point(100.0, RADIUS, contact_modulus(MATERIAL))
     for ratio in THICKNESSES:
         a = exact.half_width
-        scene = scenes.sphere(rigid="sphere", mu=0.0, lower=MATERIAL, elements=16, foundation_height=ratio * a, foundation_radius=WIDE * a)
+        scene = scenes.sphere(
+            rigid="sphere", mu=0.0, lower=MATERIAL, elements=16, foundation_height=ratio * a, foundation_radius=WIDE * a
+        )
         rows.append(_over_hertz("block", "H / a", ratio, scene))
     for ratio in SLENDER:
         force = 4 * contact_modulus(MATERIAL) * (ratio * RADIUS) ** 3 / (3 * RADIUS)
@@ -93,7 +98,11 @@ def draw_limits(rows: list[Row]) -> Figure:
     ):
         own = [row for row in rows if row["body"] == body]
         x = [row["ratio"] for row in own]
-        for name, style, colour in (("approach", "o-", ORANGE), ("peak pressure", "s-", GREEN), ("contact radius", "^-", GREY)):
+        for name, style, colour in (
+            ("approach", "o-", ORANGE),
+            ("peak pressure", "s-", GREEN),
+            ("contact radius", "^-", GREY),
+        ):
             ax.semilogx(x, [row[name] for row in own], style, color=colour, label=name)
         ax.axhline(1.0, color=BLUE, label="half-space")
         ax.set(xlabel=label)
@@ -111,14 +120,18 @@ def draw_speed(charts: list[Row], growth: list[Row]) -> Figure:
     left, right = made.subplots(1, 2)
     for name, colour in zip(dict.fromkeys(row["model"] for row in charts), (GREY, ORANGE, BLUE, GREEN)):
         own = [row for row in charts if row["model"] == name]
-        left.loglog([row["CPU s"] for row in own], [row["pressure in L2"] for row in own], "o-", color=colour, label=name)
+        left.loglog(
+            [row["CPU s"] for row in own], [row["pressure in L2"] for row in own], "o-", color=colour, label=name
+        )
     left.set(xlabel="CPU seconds", ylabel="error of the pressure in L2 [-]", title="Hertz contact")
     left.legend(frameon=False)
     for law, colour in (("frictionless", BLUE), ("coulomb", ORANGE)):
         own = [row for row in growth if row["law"] == law]
         points = [row["points"] for row in own]
         right.semilogx(points, [row["products"] for row in own], "o-", color=colour, label=f"{law}: products")
-        right.semilogx(points, [row["iterations a step"] for row in own], "o--", color=colour, label=f"{law}: iterations a step")
+        right.semilogx(
+            points, [row["iterations a step"] for row in own], "o--", color=colour, label=f"{law}: iterations a step"
+        )
     right.set(xlabel="points", ylabel="on the finest grid", title="rough surface, 16 waves", ylim=(0, None))
     right.legend(frameon=False)
     return made
