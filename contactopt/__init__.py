@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from contactopt.analysis.paths import PathResult, follow
     from contactopt.analytic import Reference
     from contactopt.bodies.fields import Fields
+    from contactopt.derivatives.gradient import gradient
+    from contactopt.derivatives.interface import sensitivity
     from contactopt.errors import BackendError, InputError
     from contactopt.interface.reduction import reduce, reduce_bodies
     from contactopt.material import Material
@@ -37,6 +39,8 @@ _HOMES = {
     "analysis.diagnosis": ("Diagnosis", "diagnose"),
     "analysis.enumeration": ("all_solutions",),
     "analysis.paths": ("PathResult", "follow"),
+    "derivatives.gradient": ("gradient",),
+    "derivatives.interface": ("sensitivity",),
     "errors": ("BackendError", "InputError"),
     "bodies.fields": ("Fields",),
     "interface.reduction": ("reduce", "reduce_bodies"),

@@ -156,6 +156,26 @@ class ElasticBody:
         U[self.kept] = self.solver.solve(force[self.kept])
         return np.asarray(U - Z @ (self.relief.T @ force) - self.relief @ (Z.T @ force))
 
+    def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        missing = -self.body.stiffness_change(constant, U)  # acts like a load
+        return self.soft @ (self.soft.T @ missing) + self.relieved(missing), self.motions.T @ missing
+
+    def material_work(self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray) -> float:
+        return -float(W @ self.body.stiffness_change(constant, U))
+
+    def load_work(self, scene: Scene, part: Part, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
+        old, new = self.body, reload_body(self.body, scene, part)
+        lift, plates = new.lift - old.lift, self.modes[0].shape[1]
+        driven = self.modes[1] @ (self.soft.T @ dual) + self.modes[0] @ weights[:plates]
+        loads = new.load - old.load - old.A @ lift
+        return float(dual @ lift + W @ loads + driven @ (new.thrust - old.thrust))
+
+    def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.body.A @ U, np.zeros(len(U))
+
+    def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
+        return float(U @ self.body.stiffness_change(constant, U)) / 2
+
     def energy(self, U: np.ndarray) -> float:
         return float(U @ (self.body.A @ U)) / 2
 
