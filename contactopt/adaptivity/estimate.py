@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class ElementErrors:
         chosen = np.zeros(len(sizes), dtype=bool)
         chosen[order[:count]] = True
         first = np.cumsum([0, *(len(part) for part in self.bodies)])
-        return tuple(np.flatnonzero(chosen[a:b]) for a, b in zip(first, first[1:]))
+        return tuple(np.flatnonzero(chosen[a:b]) for a, b in pairwise(first))
 
 
 def element_errors(solved: Solved, quantity: str) -> ElementErrors:

@@ -184,5 +184,3 @@ def _finer(scene: Scene, marked: tuple[np.ndarray, ...], curves: Curves) -> Scen
         return replace(part, mesh=divide(part.mesh, elements, curves[part.name]))
 
     return scene.with_parts(divided)
-
-

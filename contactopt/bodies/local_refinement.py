@@ -61,7 +61,9 @@ def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Curve]) -> Any:
             points[:, mine] = curve(points[:, mine])
     sizes, moved = _volumes(fine.p, fine.t), _volumes(points, fine.t)
     if np.any(moved * np.sign(sizes) < FLAT * np.abs(sizes)):
-        log.warning("new nodes stay on the edges of the mesh: on the curved boundary they would turn elements inside out")
+        log.warning(
+            "new nodes stay on the edges of the mesh: on the curved boundary they would turn elements inside out"
+        )
         return fine
     return replace(fine, doflocs=points)
 
