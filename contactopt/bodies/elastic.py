@@ -25,7 +25,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.body import Assembly, build_body, reload_body
-from contactopt.bodies.fields import Fields, fields_of
+from contactopt.bodies.fields import Fields, fields_of, recovery_error
 from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import BodySolver, System
@@ -198,6 +198,9 @@ class ElasticBody:
 
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
+
+    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+        return recovery_error(self.body, U, W)
 
     def loaded(self, scene: Scene, part: Part) -> ElasticBody:
         return _at_rest(self, reload_body(self.body, scene, part))

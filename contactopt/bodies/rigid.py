@@ -131,6 +131,9 @@ class RigidBody:
     def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
         return 0.0
 
+    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+        return np.zeros(0)
+
     def energy(self, U: np.ndarray) -> float:
         return 0.0
 
