@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Sized
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -31,6 +31,7 @@ from contactopt.analysis.edges import contact_edge, stick_edge
 from contactopt.analysis.solve_scene import Options, Solved, solve_loaded, solve_scene
 from contactopt.analysis.status import contact_status
 from contactopt.analysis.zone import solve_zone
+from contactopt.cards import card, count, line
 from contactopt.errors import InputError
 from contactopt.files import whole_folder
 from contactopt.interface.reduction import Reduction
@@ -75,6 +76,15 @@ class PathResult:
     states: tuple[State, ...]
     reduction: Reduction
 
+    def __repr__(self) -> str:
+        scene, solved = self.states[-1].scene, sum(state.solution.solved for state in self.states)
+        return line("PathResult", scene.name, count(len(self.states), "state"), f"{solved} solved")
+
+    def _repr_html_(self) -> str:
+        rows = {"states": len(self.states), "solved": sum(state.solution.solved for state in self.states)}
+        worst = max(float(state.solution.residual) for state in self.states)
+        return card(f"Load path of {self.states[-1].scene.name}", rows | {"largest residual": f"{worst:.2e}"})
+
     @property
     def solved(self) -> bool:
         return all(state.solution.solved for state in self.states)
@@ -114,8 +124,13 @@ class PathResult:
         return history
 
     def write(self, out: str | Path) -> None:
-        """history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and displacements (n, k, dim)."""
+        """history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and displacements (n, k, dim).
+
+        It also has the bounds of the friction forces (n, k) and the status (n, k): 0 open, 1 stick, 2 slip.
+        """
         problem = self.reduction.problem
+        forces = [state.solution.reactions for state in self.states]
+        masks = [contact_status(problem, r) for r in forces]
         with whole_folder(out) as staging:
             with open(staging / "history.csv", "w", newline="") as file:
                 rows = csv.writer(file)
@@ -125,7 +140,9 @@ class PathResult:
                 staging / "path.npz",
                 coordinates=problem.coordinates,
                 areas=problem.areas,
-                reactions=[state.solution.reactions for state in self.states],
+                reactions=forces,
+                bounds=[problem.law.bound(r[:, 0]) for r in forces],
+                status=[mask.stick + 2 * mask.slip for mask in masks],
                 displacements=[state.displacements for state in self.states],
             )
 
@@ -146,7 +163,7 @@ def follow(
     scenes : states that differ in their loads only: forces, tractions, prescribed displacements
     elements : across the contact half-width; the scene's own number by default. One mesh serves the whole path.
     zone : half-width that the mesh resolves [length]; by default the scene's
-    note : receives one short sentence before every step that takes time
+    note : receives one short sentence after every state, "state 17 of 41: ..." where the number of states is known
     Q, solver : form of Q and solver of the bodies, as for reduce()
     settings : arguments of solve(). Each step starts from the solution of the one before.
 
@@ -169,6 +186,7 @@ def follow_states(
 ) -> PathResult:
     """As follow(), with the options of contactopt.analysis.solve_scene."""
     options = options or Options()
+    total = f" of {len(scenes)}" if isinstance(scenes, Sized) else ""
     states: list[State] = []
     solved: Solved | None = None
     mechanics: _Mechanics | None = None
@@ -179,7 +197,8 @@ def follow_states(
             solved = solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
         state, mechanics = _state(solved, states[-1] if states else None, mechanics)
         states.append(state)
-        options.note(f"state {len(states)}: {state.solution.status}, {state.solution.iterations} iterations")
+        steps = count(state.solution.iterations, "iteration")
+        options.note(f"state {len(states)}{total}: {state.solution.status}, {steps}")
         if not state.solution.solved:
             break
     if solved is None:

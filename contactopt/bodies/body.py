@@ -182,12 +182,15 @@ def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
     known = mesh.boundaries or {}
     names = [*scene.surfaces_of(part), *(s.boundary for s in part.supports)]
     names += [load.boundary for load in part.loads if isinstance(load, (Traction, Plate))]
+    filled = sorted(boundary for boundary, facets in known.items() if len(facets))
     for name in names:
-        if name not in known or len(known[name]) == 0:
-            raise InputError(
-                f"body '{part.name}': the mesh has no boundary named {name!r} (or it is empty); "
-                f"it has {', '.join(sorted(known)) or 'none'}."
+        if name not in filled:
+            wrong = (
+                f"boundary {name!r} has no facets in this mesh"
+                if name in known
+                else f"the mesh has no boundary named {name!r}"
             )
+            raise InputError(f"body '{part.name}': {wrong}; it has {', '.join(filled) or 'none'}.")
 
 
 def _load(part: Part, basis: skfem.CellBasis, weight: tuple[float, bool]) -> np.ndarray:

@@ -25,7 +25,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.body import Assembly, build_body, reload_body
-from contactopt.bodies.fields import Fields, fields_of
+from contactopt.bodies.fields import Fields, fields_of, recovery_error
 from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import BodySolver, System
@@ -158,17 +158,17 @@ class ElasticBody:
 
     def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         missing = -self.body.stiffness_change(constant, U)  # acts like a load
-        return self.soft @ (self.soft.T @ missing) + self.relieved(missing), self.motions.T @ missing
+        return self.elastic_modes @ (self.elastic_modes.T @ missing) + self.relieved(missing), self.motions.T @ missing
 
     def material_work(self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray) -> float:
         return -float(W @ self.body.stiffness_change(constant, U))
 
     def load_work(self, scene: Scene, part: Part, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
         old, new = self.body, reload_body(self.body, scene, part)
-        lift, plates = new.lift - old.lift, self.modes[0].shape[1]
-        driven = self.modes[1] @ (self.soft.T @ dual) + self.modes[0] @ weights[:plates]
+        lift, plates = new.prescribed - old.prescribed, self.modes[0].shape[1]
+        driven = self.modes[1] @ (self.elastic_modes.T @ dual) + self.modes[0] @ weights[:plates]
         loads = new.load - old.load - old.A @ lift
-        return float(dual @ lift + W @ loads + driven @ (new.thrust - old.thrust))
+        return float(dual @ lift + W @ loads + driven @ (new.plate_forces - old.plate_forces))
 
     def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.body.A @ U, np.zeros(len(U))
@@ -198,6 +198,9 @@ class ElasticBody:
 
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
+
+    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+        return recovery_error(self.body, U, W)
 
     def loaded(self, scene: Scene, part: Part) -> ElasticBody:
         return _at_rest(self, reload_body(self.body, scene, part))

@@ -239,6 +239,9 @@ class Body(Protocol):
         U (n,) is the displacement under the contact forces `force` (n,).
         """
 
+    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+        """For each element the product of the stress errors of U and W (contactopt.bodies.fields); (0,) without elements."""
+
     def fields(self, U: np.ndarray) -> Fields | None:
         """Displacement and stress at the displacement U (n,); None for a body without any."""
 

@@ -26,6 +26,7 @@ import scipy.sparse as sp
 from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
 from contactopt.bodies.protocol import AssembledBody, Body
+from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
@@ -68,6 +69,21 @@ class Reduction:
     maps: tuple[sp.csr_matrix, ...]
     couplings: tuple[Coupling, ...]
     seconds: dict[str, float]
+
+    def __repr__(self) -> str:
+        unknowns, pairs = (
+            count(self.dofs, "unknown"),
+            count(len(self.couplings), "pair of surfaces", "pairs of surfaces"),
+        )
+        return line("Reduction", self.scene.name, unknowns, count(self.problem.contacts, "contact"), pairs)
+
+    def _repr_html_(self) -> str:
+        rows: dict[str, object] = {"scene": self.scene.name, "kind": self.scene.kind}
+        for body in self.bodies:
+            rows[f"body {body.name}"] = count(body.unknowns, "unknown")
+        for pair, coupling in zip(self.problem.pairs, self.couplings):
+            rows[f"surfaces {pair.name}"] = f"{count(len(coupling.gap), 'contact')}, coupled by {coupling.kind}"
+        return card("Reduction", rows)
 
     @property
     def coupling(self) -> Coupling:

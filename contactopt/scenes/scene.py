@@ -125,7 +125,8 @@ class Part:
 class Rigid:
     """A rigid body: its compliance is zero.
 
-    normal the contact normal, one value per component; None: the normals of the other body's contact boundary
+    normal the contact normal, one value per component; None: the normals of the other body's contact boundary. Where that is
+           curved, a gap that is measured along one direction needs this direction here
     gap    function of the other body's contact nodes, coordinates (dim, k) -> initial gap (k,) along the normal
            [length]; an array of these values, for half-spaces also of the shape of their grid; None means touching everywhere.
     force  None for an obstacle that does not move; otherwise, as in Plate, the total force on it by component.
@@ -409,7 +410,10 @@ class Scene:
             raise InputError(f"body '{body}': a value is given for each component by its name; got {short(values)}.")
         for component, value in values.items():
             if component not in self.components:
+                others = [kind for kind, names in COMPONENTS.items() if component in names]
+                remedy = f", or give the scene kind={others[-1]!r}" if others else ""
                 raise InputError(
-                    f"body '{body}': there is no component {component!r}; use {', '.join(self.components)}."
+                    f"body '{body}': there is no component {component!r}; use {', '.join(self.components)}, which are those "
+                    f"of kind {self.kind!r}{remedy}."
                 )
             check_number(f"the {component} value of body '{body}'", value, -LARGEST_VALUE, LARGEST_VALUE)

@@ -170,7 +170,7 @@ def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
         return closed
     force = float(np.sum(np.abs(problem.s) / np.maximum(np.abs(problem.V).max(axis=0, initial=0.0), LEAST_REACH)))
     indented = gap + diagonal(problem.Q).reshape(problem.q.shape)[:, 0] * force
-    for first, last in [(pair.first, pair.last) for pair in problem.pairs] or [(0, problem.contacts)]:
+    for first, last in [(pair.start, pair.stop) for pair in problem.pairs] or [(0, problem.contacts)]:
         own = slice(first, last)
         closed[own] |= gap[own] <= indented[own].min(initial=np.inf)
     return closed if closed.all() or _determined(problem, closed) else np.ones(problem.contacts, dtype=bool)

@@ -115,6 +115,8 @@ class Auto:
     @staticmethod
     def _jammed(problem: InterfaceProblem, matrix: Blocks, reached: Iterate) -> Generator[Iterate, None, None]:
         """Without end: interior-point paths drawn at random, and the gentle proximal loop from the best point so far."""
+        from contactopt.solving.methods.cone import AcaryCadoux
+
         random, evaluate = np.random.default_rng(0), proximal_equations(problem, matrix).evaluate
         interior = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         for restarts in count():
