@@ -317,7 +317,13 @@ def test_shear_cycle_loses_what_mindlin_says():
 
     scene = scenes.cattaneo_half_space(material=Material(5.0, 0.0), shear=25.0, elements=32)
     states = []
-    for shear in [0.0, 25.0, -25.0, -18.75, 25.0]:  # from the start at -18.75 Newton's steps diverge if they go on from -25
+    for shear in [
+        0.0,
+        25.0,
+        -25.0,
+        -18.75,
+        25.0,
+    ]:  # from the start at -18.75 Newton's steps diverge if they go on from -25
         states.append(replace(scene, upper=replace(scene.upper, force={"x": shear, "z": -100.0})))
     path = contactopt.follow(states)
     work = path.history["friction_work"]
