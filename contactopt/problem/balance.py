@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.optimize import linprog, nnls
 
 from contactopt.problem.interface_problem import InterfaceProblem
 
@@ -95,6 +94,8 @@ def _balanced(problem: InterfaceProblem, s: np.ndarray) -> bool:
 
 def _nonnegative(A: sp.csc_array, b: np.ndarray) -> np.ndarray | None:
     """x >= 0 with A x near b; None if none is found."""
+    from scipy.optimize import linprog, nnls  # late, since it takes long to import
+
     if len(b) <= FEW:
         try:
             return np.asarray(nnls(A.toarray(), b)[0])
@@ -107,6 +108,8 @@ def _nonnegative(A: sp.csc_array, b: np.ndarray) -> np.ndarray | None:
 
 def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.ndarray | None:
     """min |z|_1 over motions with s' z = 1 and V z in a polygon inside each dual cone; None if there are none."""
+    from scipy.optimize import linprog
+
     k, d = problem.q.shape
     normal = np.arange(k) * d
     ways, factor = _ways(d), 1.0 if d == 2 else 1 / np.cos(np.pi / DIRECTIONS)
@@ -117,8 +120,8 @@ def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.nda
         slope = sum(c * V[normal + 1 + i] for i, c in enumerate(way))
         rows.append((sp.diags_array(factor * mu) @ slope - V[normal])[~smooth])
     A = sp.vstack(rows, format="csr")
-    still = [V[normal[fixed] + 1 + i] for i in range(d - 1)] if fixed.any() else []
-    equal = sp.vstack([sp.csr_array(s[None]), *still], format="csr")
+    rows_of_fixed = [V[normal[fixed] + 1 + i] for i in range(d - 1)] if fixed.any() else []
+    equal = sp.vstack([sp.csr_array(s[None]), *rows_of_fixed], format="csr")
     answer = linprog(  # z = z+ - z-
         np.ones(2 * len(s)),
         sp.hstack([A, -A], format="csr"),

@@ -15,13 +15,13 @@ from scipy.sparse.linalg import splu
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
+from contactopt.solving.constants import LOOSE
 from contactopt.solving.kernels.bonded import SOFTEST, Bonded
 from contactopt.solving.kernels.krylov import krylov_step, model_of
 from contactopt.solving.kernels.semismooth import RIDGE, Equations
 
 FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-4  # accuracy of an iterative step: the first, and the bounds of the others
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
-LOOSE = 0.5  # share of contacts that do not stick, up to which the bonded factorisation is cheaper than a new one
 
 LEAST_REACH = 1e-12  # of a multiplier's column of V, which is dimensionless
 HELD = 1e-8  # share of its motion that the glued contacts must feel of every multiplier
@@ -170,7 +170,7 @@ def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
         return closed
     force = float(np.sum(np.abs(problem.s) / np.maximum(np.abs(problem.V).max(axis=0, initial=0.0), LEAST_REACH)))
     indented = gap + diagonal(problem.Q).reshape(problem.q.shape)[:, 0] * force
-    for first, last in [(pair.first, pair.last) for pair in problem.pairs] or [(0, problem.contacts)]:
+    for first, last in [(pair.start, pair.stop) for pair in problem.pairs] or [(0, problem.contacts)]:
         own = slice(first, last)
         closed[own] |= gap[own] <= indented[own].min(initial=np.inf)
     return closed if closed.all() or _determined(problem, closed) else np.ones(problem.contacts, dtype=bool)
