@@ -52,7 +52,7 @@ with an elastic punch 1e7 times as stiff, whose mesh does not match:
 
 Cattaneo and Mindlin: cylinders pressed, then sheared in one step; root mean squares over shears, and their ratios to those of
 matching meshes of 20:20. Where the meshes have nodes at the edges of stick (three shears, each with its meshes), matching nodes turn
-this to account, because both bodies have the same kinks there, and the fine side does not. Nodes anywhere: eight shears on
+this to account, because both bodies have the same kinks there, and the fine side does not. Nodes anywhere: four shears on
 meshes made for another one.
 
 {cattaneo}
