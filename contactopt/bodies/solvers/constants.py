@@ -18,5 +18,7 @@ NEAR = 1.5  # neighbours at up to this multiple of the least distance are aggreg
 DEGREE = 3  # products with A in the smoother, which is a polynomial of this degree less one
 
 # Limits, not fitted.
+LARGE = 2**20  # entries of a matrix from which threads share its products; a product takes about a millisecond then
+SHARE = 4  # pieces of such a product for each core; whoever is free takes the next one
 RTOL = 1e-10  # accuracy of an iterative solve when none is asked for
 MOST = 300  # conjugate gradient iterations before a solve is given up
