@@ -222,7 +222,7 @@ def reduce_bodies(
         check_number("the contact zone's half-width", zone, low=0.0)
     seconds: dict[str, float] = {}
     start = time.perf_counter()
-    assembled = [assemble(scene, part, elements, zone) for part in scene.parts]
+    assembled = each(lambda part: assemble(scene, part, elements, zone), scene.parts)
     named = {body.name: body for body in assembled}
     sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
     coupled = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in zip(scene.pairs, sides))
