@@ -20,5 +20,6 @@ DEGREE = 3  # products with A in the smoother, which is a polynomial of this deg
 # Limits, not fitted.
 LARGE = 2**20  # entries of a matrix from which threads share its products; a product takes about a millisecond then
 SHARE = 4  # pieces of such a product for each core; whoever is free takes the next one
+GALERKIN = 8  # pieces of rows from which the matrix of the next level is summed up
 RTOL = 1e-10  # accuracy of an iterative solve when none is asked for
 MOST = 300  # conjugate gradient iterations before a solve is given up

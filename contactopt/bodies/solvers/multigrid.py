@@ -24,8 +24,9 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from contactopt.bodies.concurrency import Crew
 from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST, NEAR, RTOL
-from contactopt.bodies.solvers.products import SparseProduct
+from contactopt.bodies.solvers.products import BlockProduct, SparseProduct, galerkin
 from contactopt.bodies.solvers.system import (
+    Block,
     Iteration,
     Product,
     System,
@@ -57,7 +58,8 @@ class MultigridSolver:
     def __init__(self, system: System):
         self.last, self.n = system.last, system.A.shape[0]
         crew = Crew()
-        self.A = SparseProduct(system.A, crew)
+        block = isinstance(system.A, Block)
+        self.A = BlockProduct(system.A, crew) if block else SparseProduct(system.A, crew)
         self.cycle = VCycle(*system[:4], crew)
 
     @property
@@ -122,7 +124,7 @@ class VCycle:
     Arguments as in contactopt.bodies.solvers.system.System, and the threads that share large products. Raises InputError if the package pyamg is missing.
     """
 
-    def __init__(self, A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, points: np.ndarray, crew: Crew):
+    def __init__(self, A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, points: np.ndarray, crew: Crew):
         blocks, self.place, present = nodal_blocks(A, node, component, len(points))
         self.scale = _inverse_root(A.diagonal())
         self.size = blocks.shape[0]
@@ -133,7 +135,7 @@ class VCycle:
         while points.shape[1] > COARSEST:
             level = SparseProduct(_scaled(blocks, scale, scale), crew)
             P, modes, points = coarsen(blocks, modes, points)
-            blocks = sp.bsr_matrix(P.T @ (blocks @ P))
+            blocks = galerkin(P, blocks, crew)
             coarse = _inverse_root(blocks.diagonal())
             P = _scaled(P, np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0), coarse).tocsr()
             self.levels.append(Level(level, SINGLE(largest_eigenvalue(level)), SparseProduct(P, crew), SparseProduct(P.T.tocsr(), crew)))
@@ -177,7 +179,7 @@ class Answer(NamedTuple):
     cycles: int
 
 
-def conjugate_gradients(A: SparseProduct, cycle: VCycle, load: np.ndarray, rtol: float) -> Answer:
+def conjugate_gradients(A: SparseProduct | BlockProduct, cycle: VCycle, load: np.ndarray, rtol: float) -> Answer:
     """Solution of A x = load by conjugate gradients with a V-cycle.
 
     It ends where (r' B r)^1/2, r the residual, has fallen by `rtol`.
@@ -269,7 +271,7 @@ def largest_eigenvalue(A: SparseProduct) -> float:
 
 
 def nodal_blocks(
-    A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, dim: int
+    A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
     """A in blocks of nodes; its rows are made some at a time, for the copies take more than the result.
 

@@ -17,8 +17,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.concurrency import Crew
-from contactopt.bodies.solvers.constants import LARGE, SHARE
+from contactopt.bodies.solvers.constants import GALERKIN, LARGE, SHARE
 from contactopt.bodies.solvers.mkl import library
+from contactopt.bodies.solvers.system import Block
 
 _PLAIN, _GENERAL, _ROWS = 10, 20, 101  # oneMKL's names: A itself, no structure, blocks stored row by row
 
@@ -56,6 +57,18 @@ class SparseProduct:
         return y
 
 
+class BlockProduct:
+    """x (n,) -> A @ x for a Block A, by products with the whole matrix."""
+
+    def __init__(self, block: Block, crew: Crew | None = None):
+        self.block, self.whole = block, SparseProduct(block.whole, crew)
+
+    def __matmul__(self, x: np.ndarray) -> np.ndarray:
+        full = np.zeros(self.block.whole.shape[0])
+        full[self.block.kept] = x
+        return np.asarray((self.whole @ full)[self.block.kept])
+
+
 class _Piece:
     """Some rows of a matrix, and oneMKL's view of them if it has one."""
 
@@ -82,21 +95,42 @@ class _Piece:
         return int(failed)
 
 
-def _pieces(
-    A: sp.csr_matrix | sp.bsr_matrix, count: int
-) -> Iterator[tuple[slice, sp.csr_matrix | sp.bsr_matrix]]:
+def galerkin(P: sp.bsr_matrix, A: sp.bsr_matrix, crew: Crew) -> sp.bsr_matrix:
+    """P' A P, from pieces of rows of A, each in a thread of its own: A P is never there as a whole."""
+    height = P.blocksize[0]
+    found: dict[int, sp.bsr_matrix] = {}
+
+    def part(number: int, rows: slice, own: sp.bsr_matrix) -> None:
+        found[number] = sp.bsr_matrix(_rows(P, rows.start // height, rows.stop // height).T @ (own @ P))
+
+    pieces = _pieces(A, GALERKIN if A.nnz >= LARGE else 1)
+    crew.each([partial(part, number, *piece) for number, piece in enumerate(pieces)])
+    total = found.pop(0)
+    for number in sorted(found):  # in an order that does not depend on the threads
+        total = total + found.pop(number)
+    return sp.bsr_matrix(total)
+
+
+def _pieces(A: sp.csr_matrix | sp.bsr_matrix, count: int) -> Iterator[tuple[slice, sp.csr_matrix | sp.bsr_matrix]]:
     """Consecutive rows of A with about as many entries each; their entries are not copied."""
-    if count == 1:
-        yield slice(0, A.shape[0]), A
-        return
     height = A.blocksize[0] if A.format == "bsr" else 1
     inner = np.searchsorted(A.indptr, np.arange(1, count) * (int(A.indptr[-1]) / count))
     for first, stop in pairwise([0, *inner.tolist(), len(A.indptr) - 1]):
-        if first < stop:
-            entries = slice(int(A.indptr[first]), int(A.indptr[stop]))
-            indptr = A.indptr[first : stop + 1] - A.indptr[first]
-            part = (A.data[entries], A.indices[entries], indptr)
-            yield slice(first * height, stop * height), type(A)(part, ((stop - first) * height, A.shape[1]))
+        if first < stop or count == 1:
+            yield slice(first * height, stop * height), _rows(A, first, stop)
+
+
+def _rows(A: sp.csr_matrix | sp.bsr_matrix, first: int, stop: int) -> sp.csr_matrix | sp.bsr_matrix:
+    """Rows of A, or of its blocks, from `first` to before `stop`, without a copy."""
+    if (first, stop) == (0, len(A.indptr) - 1):
+        return A
+    entries = slice(int(A.indptr[first]), int(A.indptr[stop]))
+    size = A.blocksize if A.format == "bsr" else (1, 1)
+    part = type(A)(((stop - first) * size[0], A.shape[1]), **({"blocksize": size} if A.format == "bsr" else {}), dtype=A.dtype)
+    # Given to the constructor, parts of arrays would be copied.
+    part.data, part.indices = A.data[entries], A.indices[entries]
+    part.indptr = A.indptr[first : stop + 1] - A.indptr[first]
+    return part
 
 
 def _kind(A: sp.csr_matrix) -> tuple[str, Any]:
