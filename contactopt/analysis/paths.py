@@ -192,7 +192,7 @@ class _Mechanics:
 def _mechanics(reduction: Reduction, solution: Solution) -> _Mechanics:
     """The state of the bodies under contact forces and plate displacements."""
     problem, r = reduction.problem, solution.reactions
-    U = list(reduction.displaced(r, solution.multipliers))
+    U = list(reduction.displaced(solution))
     F = [body.external_forces(own) for body, own in zip(reduction.bodies, U)]
     elastic = sum(body.energy(own) for body, own in zip(reduction.bodies, U))
     return _Mechanics(r, problem.displacements(r, solution.multipliers), U, F, elastic)

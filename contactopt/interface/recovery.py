@@ -11,6 +11,6 @@ __all__ = ["Fields", "recover"]
 
 def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:
     """Displacement and stress of the elastic bodies of a solved scene, upper body first."""
-    displaced = zip(reduction.bodies, reduction.displaced(solution.reactions, solution.multipliers))
+    displaced = zip(reduction.bodies, reduction.displaced(solution))
     fields = (body.fields(U) for body, U in displaced)
     return tuple(found for found in fields if found is not None)

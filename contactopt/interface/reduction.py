@@ -31,7 +31,7 @@ from contactopt.errors import InputError
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
 from contactopt.interface.coupling import Coupling, couple
 from contactopt.interface.equilibrium import coupled_form
-from contactopt.problem import InterfaceProblem, Law, Pair
+from contactopt.problem import InterfaceProblem, Law, Pair, Solution
 from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
@@ -99,10 +99,27 @@ class Reduction:
         ends = np.cumsum([len(body.resultants) for body in self.bodies])
         return tuple(np.split(multipliers, ends[:-1]))
 
-    def displaced(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, ...]:
-        """The displacements U (n,) of every body under reactions (k, dim) and multipliers (p,)."""
-        parts = zip(self.bodies, self.maps, self.own_multipliers(multipliers))
-        return tuple(body.displacement(B.T @ reactions.ravel(), own) for body, B, own in parts)
+    def displaced(self, solution: Solution) -> tuple[np.ndarray, ...]:
+        """The displacements U (n,) of every body of a solution.
+
+        Bodies whose displacements came with the contact forces are not solved again.
+        """
+        known = solution.displacements
+        systems = [None if known is None else body.equilibrium for body in self.bodies]
+        ends = np.cumsum([0 if system is None else len(system.free) for system in systems])
+        found = []
+        for body, B, own, system, end in zip(
+            self.bodies, self.maps, self.own_multipliers(solution.multipliers), systems, ends
+        ):
+            force = B.T @ solution.reactions.ravel()
+            if system is None or known is None:
+                found.append(body.displacement(force, own))
+                continue
+            left, right = system.low_rank
+            U = body.at_rest + body.motions @ own + left @ (right.T @ force)
+            U[system.free] += known[end - len(system.free) : end]
+            found.append(U)
+        return tuple(found)
 
     def loaded(self, scene: Scene) -> Reduction:
         """The same bodies, coupling and Q under the loads of another scene of the same structure.

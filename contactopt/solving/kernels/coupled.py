@@ -111,7 +111,8 @@ class Coupled:
         energy = float(at.X @ (form.trace.T @ r.ravel() - missing))
         lacking = float(missing @ correction)
         accuracy = np.sqrt(lacking / energy) if energy > 0 else (np.inf if lacking else 0.0)
-        return r, at.multipliers, Moved(form.moved(at.X + correction, r.ravel()), float(accuracy))
+        better = at.X + correction
+        return r, at.multipliers, Moved(form.moved(better, r.ravel()), float(accuracy), better)
 
 
 def coupled_steps(
