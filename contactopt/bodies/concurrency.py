@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+from contactopt.problem.threads import cores
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -27,11 +29,6 @@ def each(
         running = [pool.submit(act, item) if mark else None for item, mark in zip(listed, marked)]
         here = [act(item) if future is None else None for item, future in zip(listed, running)]
         return tuple(done if future is None else future.result() for future, done in zip(running, here))  # type: ignore[misc]
-
-
-def cores() -> int:
-    """Number of cores that this process may use. OMP_NUM_THREADS does not bound it: that is for threads of BLAS."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class Crew:

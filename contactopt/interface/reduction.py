@@ -17,6 +17,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,6 +37,7 @@ from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
 from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, dense, estimate_diagonal, nodal_weights
+from contactopt.problem.threads import one_blas_thread
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import MOST_ELEMENTS, Part, Scene
 
@@ -256,7 +258,9 @@ def reduce_bodies(
     log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, n)
     if Q == "explicit":
         check_dense(round(_filling(maps) ** 0.5))
-    bodies = each(lambda body: body.prepare(solver, Q == "explicit"), assembled)
+    iterate = any(body.iterates(solver) for body in assembled)
+    with one_blas_thread() if iterate else nullcontext():
+        bodies = each(lambda body: body.prepare(solver, Q == "explicit"), assembled)
     seconds["factorise"] = time.perf_counter() - start
 
     start = time.perf_counter()

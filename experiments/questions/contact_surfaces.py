@@ -162,7 +162,7 @@ def lanczos(P: LinearOperator, Q: LinearOperator) -> float:
                 share = images[i] @ w
                 T[i, j] += share
                 w = w - share * basis[i]
-    values = np.linalg.eigvalsh((T + T.T) / 2)
+    values = np.linalg.eigvalsh(np.triu(T) + np.triu(T, 1).T)
     return float(values[-1] / values[0])
 
 

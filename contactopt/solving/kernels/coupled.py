@@ -24,6 +24,7 @@ import numpy as np
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 from contactopt.problem.coupled import CoupledForm
+from contactopt.problem.threads import one_blas_thread
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.alart_curnier import coulomb_equations, glued_contacts, glued_projection
 from contactopt.solving.kernels.flexible import flexible_gmres
@@ -122,17 +123,20 @@ def coupled_steps(
     start: tuple[np.ndarray, np.ndarray] | None,
 ) -> Iterator[tuple[Known, float]]:
     """Newton's iterates with the residual of the equations that each step began with; ends where a step fails."""
-    P = fitted(model_of(problem, preconditioner, deflate=False), form)
-    coupled = Coupled(coulomb_equations(problem), form, P)
-    at = _bonded(problem, coupled) if start is None else State(in_equilibrium(form, start[0]), *start)
+    with one_blas_thread():
+        P = fitted(model_of(problem, preconditioner, deflate=False), form)
+        coupled = Coupled(coulomb_equations(problem), form, P)
+        at = _bonded(problem, coupled) if start is None else State(in_equilibrium(form, start[0]), *start)
     last = np.inf
     while at is not None:
-        right, linearised = coupled.linearised(at)
-        residual = coupled.size(right)
-        error = right[form.size : form.size + at.r.size].reshape(at.r.shape)
-        yield coupled.judged(at, error), residual
+        with one_blas_thread():
+            right, linearised = coupled.linearised(at)
+            residual = coupled.size(right)
+            known = coupled.judged(at, right[form.size : form.size + at.r.size].reshape(at.r.shape))
+        yield known, residual
         rtol = min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else FIRST
-        at, last = coupled.step(at, right, linearised, rtol), residual
+        with one_blas_thread():
+            at, last = coupled.step(at, right, linearised, rtol), residual
 
 
 def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
