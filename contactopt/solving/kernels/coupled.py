@@ -81,7 +81,7 @@ class Coupled:
     def step(self, at: State, right: np.ndarray, linearised: Linearised, rtol: float) -> State | None:
         """The state after Newton's step, or None if its linear system could not be solved."""
         form, V, N, n = self.form, self.equations.V, self.form.size, at.r.size
-        inverse = linearised.inverse(self.P, INNER)
+        inverse = linearised.rough(self.P)
         model = (lambda x: self.P @ x) if self.P.model is None else self.P.model.matvec
 
         def product(x: np.ndarray) -> np.ndarray:
