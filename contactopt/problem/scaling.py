@@ -35,16 +35,18 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     makes that force zero instead of undetermined.
     """
     d = diagonal(problem.Q)
-    compliance = float(np.mean(d[d > 0])) if np.any(d > 0) else 1.0
     columns = np.linalg.norm(problem.V, axis=0)
     total = np.abs(problem.V).sum(axis=0)
     resultant = np.divide(np.abs(problem.s), total, out=np.zeros(len(problem.s)), where=total > 0)
-    force = float(resultant.max(initial=0.0)) or _closing(problem) / compliance or 1.0
+    balanced = float(resultant.max(initial=0.0))
+    if np.any(d > 0):
+        compliance = float(np.mean(d[d > 0]))
+    else:  # rigid bodies: only gaps have a length
+        compliance = (float(np.abs(problem.q).max(initial=0.0)) or 1.0) / (balanced or 1.0)
+    force = balanced or _closing(problem) / compliance or 1.0
     length = force * compliance
     columns = np.where(columns > 0, columns, 1.0)
-    sizes = d if isinstance(problem.Q, InterfaceOperator) else row_sizes(problem.Q)
-    moves = [sizes, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
-    rigid = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
+    rigid = immovable(problem)
     Q: Interface
     if isinstance(problem.Q, InterfaceOperator):
         Q = problem.Q.scaled(1 / compliance, rigid.astype(float))
@@ -63,6 +65,13 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
         law=problem.law.scaled(force),
     )
     return scaled, Scales(force, length, length / columns)
+
+
+def immovable(problem: InterfaceProblem) -> np.ndarray:
+    """Mask (k dim,) of the components that neither forces nor multipliers nor q move."""
+    sizes = problem.Q.diagonal if isinstance(problem.Q, InterfaceOperator) else row_sizes(problem.Q)
+    moves = [sizes, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
+    return np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
 
 
 def _closing(problem: InterfaceProblem) -> float:

@@ -22,4 +22,4 @@ LARGE = 2**20  # entries of a matrix from which threads share its products; a pr
 SHARE = 4  # pieces of such a product for each core; whoever is free takes the next one
 GALERKIN = 8  # pieces of rows from which the matrix of the next level is summed up
 RTOL = 1e-10  # accuracy of an iterative solve when none is asked for
-MOST = 300  # conjugate gradient iterations before a solve is given up
+MOST_ITERATIONS = 300  # conjugate gradient iterations before a solve is given up

@@ -42,7 +42,7 @@ Act = Callable[[np.ndarray], np.ndarray]
 Root = tuple[Act, Act]  # products with P and with G = P^-1
 
 
-def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
+def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
     """Products (k, dim) -> (k, dim) with P and with its inverse G, scaled to a mean diagonal of one.
 
     The mean diagonal is an estimate by random signs (Hutchinson 1989).
@@ -50,7 +50,7 @@ def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
     Parameters
     ----------
     problem : whose chart knows the cells of the contact surface
-    still : (k, dim) mask of the components that cannot move
+    held : (k, dim) mask of the components that cannot move
 
     Returns
     -------
@@ -66,7 +66,6 @@ def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
         raise InputError(
             "the preconditioner 'laplacian' needs the cells of the contact surface, which are not known here."
         )
-    own = len(problem.coordinates) == problem.dim
     points = problem.coordinates if len(problem.coordinates) == problem.dim else problem.chart.places
     K, mass, shift, share = surface_matrices(points, cells)
     # Forces are spread over the nodal areas, which differ from the mass where the surface goes around an axis.
@@ -79,10 +78,10 @@ def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
         roots[1] = (tangential, 1.0, vector)
     made = []
     for components, factor, matrix in roots:
-        moves = ~still[:, components]
+        moves = ~held[:, components]
         if moves.any():
-            repeated = (np.repeat(values, moves.shape[1]) for values in (mass, shift, share, depth))
-            made.append((components, moves, factor, square_root(matrix, *repeated, moves.ravel())))
+            values = (np.repeat(own, moves.shape[1]) for own in (mass, shift, share, depth))
+            made.append((components, moves, factor, square_root(matrix, *values, moves=moves.ravel())))
 
     def product(X: np.ndarray, inverse: bool) -> np.ndarray:
         out = np.zeros(X.shape)
@@ -92,8 +91,8 @@ def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
             out[:, components] = own
         return out
 
-    signs = np.where(np.random.default_rng(0).random(still.shape) < 0.5, -1.0, 1.0) * ~still
-    mean = float(np.sum(signs * product(signs, True))) / max(int((~still).sum()), 1) or 1.0
+    signs = np.where(np.random.default_rng(0).random(held.shape) < 0.5, -1.0, 1.0) * ~held
+    mean = float(np.sum(signs * product(signs, True))) / max(int((~held).sum()), 1) or 1.0
     return lambda X: mean * product(X, False), lambda X: product(X, True) / mean
 
 
