@@ -102,7 +102,6 @@ def phases(elements: int, cores: int) -> list[dict[str, object]]:
     assembled = timed("assembly", lambda: each(lambda part: assemble(scene, part, elements, None), scene.parts))
     with one_blas_thread():
         timed("hierarchies", lambda: each(lambda body: body.prepare("multigrid", False), assembled))
-    del assembled
     reduction = reduce_bodies(scene, elements, solver="multigrid")
     solution = timed("solution", lambda: solve(reduction.problem, "newton"))
     timed("displacements and stresses", lambda: recover(reduction, solution))

@@ -80,8 +80,8 @@ def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
     for components, factor, matrix in roots:
         moves = ~held[:, components]
         if moves.any():
-            values = (np.repeat(own, moves.shape[1]) for own in (mass, shift, share, depth))
-            made.append((components, moves, factor, square_root(matrix, *values, moves=moves.ravel())))
+            values = np.repeat([mass, shift, share, depth], moves.shape[1], axis=1)
+            made.append((components, moves, factor, square_root(matrix, values, moves.ravel())))
 
     def product(X: np.ndarray, inverse: bool) -> np.ndarray:
         out = np.zeros(X.shape)
@@ -177,15 +177,17 @@ def _simplices(points: np.ndarray, corners: np.ndarray) -> tuple[list[np.ndarray
     return [-second - third, second, third], np.sqrt(square) / 2
 
 
-def square_root(
-    K: sp.csr_matrix, mass: np.ndarray, shift: np.ndarray, share: np.ndarray, depth: np.ndarray, moves: np.ndarray
-) -> Root:
-    """Products with P and with G on the unknowns of the mask `moves` (n,), for K (n, n) and values (n,) of their contacts."""
-    full = mass[moves] / share[moves]
-    weight = np.sqrt(full * depth[moves]) * share[moves] ** EDGE
+def square_root(K: sp.csr_matrix, values: np.ndarray, moves: np.ndarray) -> Root:
+    """Products with P and with G on the unknowns of the mask `moves` (n,), for K (n, n).
+
+    values  (4, n) mass, shift, share and depth of the contact of each unknown
+    """
+    mass, shift, share, depth = values[:, moves]
+    full = mass / share
+    weight = np.sqrt(full * depth) * share**EDGE
     scale = sp.diags(full**-0.5)
-    L = sp.csc_matrix(scale @ K[moves][:, moves] @ scale + sp.diags(shift[moves]))
-    low, high = float(shift[moves].min()), float(abs(L).sum(axis=1).max())
+    L = sp.csc_matrix(scale @ K[moves][:, moves] @ scale + sp.diags(shift))
+    low, high = float(shift.min()), float(abs(L).sum(axis=1).max())
     eye = sp.eye(L.shape[0], format="csc")
     order = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
     poles = [(c, splu(L + s * eye, **order)) for c, s in zip(*inverse_root(low, high))]
