@@ -178,7 +178,7 @@ def many(n: int) -> dict[str, object]:
 
 
 def draw(rows: list[dict]) -> Figure:
-    figure = Figure(figsize=(7, 4.2), layout="constrained")
+    figure = Figure(figsize=(7, 5), layout="constrained")
     ax = figure.subplots()
     surfaces = list(dict.fromkeys(row["surface"] for row in rows))
     for i, surface in enumerate(surfaces):
@@ -191,7 +191,7 @@ def draw(rows: list[dict]) -> Figure:
     for title, colour in (("laplacian", ORANGE), ("laplacian, deflated", BLUE)):
         ax.plot([], [], color=colour, label=title)
     ax.set(xlabel="contacts [-]", ylabel="condition number [-]", ylim=(0, None))
-    ax.legend(frameon=False, fontsize=8, ncol=2)
+    figure.legend(loc="outside lower center", frameon=False, fontsize=8, ncol=3)
     return figure
 
 
@@ -210,7 +210,7 @@ fitted to stubs is ALONG (`contactopt/solving/preconditioners/constants.py`), on
 
 {{rows}}
 
-The ring with so many contacts that Q is known by its products only; the condition number is what conjugate gradients saw of it:
+The ring with so many contacts that Q is known by its products only; the condition number is an estimate from below by Lanczos' method:
 
 {{many}}
 """

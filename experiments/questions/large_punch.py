@@ -1,7 +1,7 @@
 """What does friction cost beside one linear solve, up to a punch of a million unknowns in 3D?
 
 `python -m experiments.questions.large_punch [elements ...]` measures the sizes and writes the report, `--phases [elements]` measures
-the phases on one core and on two. Wall times mean something only where no other program has a share of the cores.
+the phases on one core and on two. Wall times mean something only where no other program has a share of the cores. The phases come first.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ WAYS = {"coupled": "coupled", "products": "krylov"}  # -> Newton's linear solver
 KEYS = ("elements", "way", "mu")
 MODULE = "experiments.questions.large_punch"
 PHASES_AT = 32  # elements
+PHASES = REPORTS / "large_punch" / "phases.json"  # what `--phases` measured last
 
 
 def once(elements: int, way: str, mu: float) -> dict[str, object]:
@@ -164,10 +165,10 @@ both, at mu = .5: {ratios}.
 V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to {most}, over all sizes and mu.
 CPU time of `products` over that of `coupled`, set-up included: {faster}.
 
-Wall over CPU time of every phase, {at}: one half is the best that two cores can reach. With real-time priority, so that other
+Wall over CPU time of every phase: one half is the best that two cores can reach. With real-time priority, so that other
 programs do not disturb; threads are those that share bodies and products, and BLAS has one thread except in the last columns.
 
-{{phases}}
+{phases}
 """
 
 
@@ -198,10 +199,11 @@ if __name__ == "__main__":
         print(json.dumps(phases(int(sys.argv[2]), int(sys.argv[3]))))
     elif sys.argv[1:2] == ["--phases"]:
         measured = phase_table(int(sys.argv[2]) if len(sys.argv) > 2 else PHASES_AT)
-        (REPORTS / "large_punch" / "phases.json").write_text(json.dumps(measured, indent=1))
+        PHASES.write_text(json.dumps(measured, indent=1) + "\n")
         print(markdown(measured))
     else:
         rows = [isolated(*run) for run in runs([int(size) for size in sys.argv[1:]] or list(SIZES))]
         rows = merged("large_punch", "sizes", rows, KEYS)
         rows = sorted(rows, key=lambda row: (int(row["unknowns"]), row["way"], float(row["mu"])))
-        write("large_punch", "Friction beside one linear solve", report(rows), {"sizes": rows}, {"growth": draw(rows)})
+        tables = {"sizes": rows, "phases": json.loads(PHASES.read_text())}
+        write("large_punch", "Friction beside one linear solve", report(rows), tables, {"growth": draw(rows)})
