@@ -11,24 +11,32 @@ import numpy as np
 WAYS = ("dense", "products", "coupled")
 MOST_EXPLICIT = 8000  # interface unknowns of an explicit Q that is chosen without being asked for
 
-# (dimension, way, body solver) -> seconds per unit of each term of `terms`, on one core
-COSTS: dict[tuple[int, str, str], tuple[float, ...]] = {}
+# (dimension, body solver) -> seconds per unit of each of `terms`, on one core
+COSTS: dict[tuple[int, str], tuple[float, ...]] = {
+    (2, "superlu"): (3.35e-05, 0.0, 4.8e-10, 1.21e-06),
+    (2, "pardiso"): (2.87e-05, 0.0, 2.47e-10, 3.43e-06),
+    (2, "multigrid"): (8.1e-05, 0.0, 0.0, 0.0),
+    (3, "superlu"): (6.77e-05, 5.44e-09, 1.34e-09, 2.38e-06),
+    (3, "pardiso"): (5.8e-05, 1.61e-09, 2.81e-10, 5.45e-06),
+    (3, "multigrid"): (0.000115, 0.0, 0.0, 0.0),
+}
 
 
 def terms(way: str, m: int, n: int, dim: int) -> np.ndarray:
-    """What the cost of a way grows with, for n unknowns of the largest body, m of them on its contact surface.
+    """What the cost of a way grows with (4,), for n unknowns of the largest body, m of them on its contact surface.
 
-    Assembly grows with n. Factors take n^1.5 operations in the plane and n^2 in space, and a product with them n log2 n and
-    n^(4/3) (nested dissection). A dense Q takes m^3 operations, and the V-cycles of the coupled way n.
+    Assembly grows with n, and so does the coupled way with its V-cycles. Factors take n^1.5 operations in the plane and n^2 in
+    space, a dense Q m^3, and products with Q n log2 n or n^(4/3) (nested dissection).
     """
     factors = n ** (1.5 if dim == 2 else 2.0)
     substitution = n * np.log2(max(n, 2)) if dim == 2 else n ** (4 / 3)
-    return np.array({"dense": (n, factors, m**3), "products": (n, factors, substitution), "coupled": (n,)}[way], dtype=float)
+    of_way = {"dense": (n, factors, m**3, 0), "products": (n, factors, 0, substitution), "coupled": (n, 0, 0, 0)}
+    return np.array(of_way[way], dtype=float)
 
 
 def seconds(way: str, m: int, n: int, dim: int, solver: str) -> float:
     """The estimated time of set-up and solution on one core."""
-    return float(np.dot(COSTS[dim, way, solver], terms(way, m, n, dim)))
+    return float(np.dot(COSTS[dim, solver], terms(way, m, n, dim)))
 
 
 def form_of(m: int, n: int, dim: int, iterative: bool, solver: str = "superlu") -> str:

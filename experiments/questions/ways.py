@@ -77,23 +77,18 @@ def measured() -> list[dict[str, object]]:
 
 
 def fitted(rows: list[dict]) -> list[dict[str, object]]:
-    """COSTS by least squares of relative errors over numbers that are not negative, and how far the estimate is off."""
+    """COSTS by least squares of relative errors over numbers that are not negative, and how far the estimates are off."""
     found: list[dict[str, object]] = []
-    for dim, way, solver in dict.fromkeys((row["dim"], row["way"], row["solver"]) for row in rows):
-        mine = [row for row in rows if (row["dim"], row["way"], row["solver"]) == (dim, way, solver)]
+    for dim, solver in dict.fromkeys((row["dim"], row["solver"]) for row in rows):
+        mine = [row for row in rows if (row["dim"], row["solver"]) == (dim, solver)]
         t = np.array([row["whole [s]"] for row in mine])
-        A = np.array([terms(way, row["m"], row["n"], dim) for row in mine])
+        A = np.array([terms(row["way"], row["m"], row["n"], dim) for row in mine])
         prices, _ = nnls(A / t[:, None], np.ones(len(t)))
-        ratio = A @ prices / t
-        found.append(
-            {
-                "dim": dim,
-                "way": way,
-                "solver": solver,
-                "prices": " ".join(f"{price:.2e}" for price in prices),
-                "estimate over measured": f"{ratio.min():.2f} to {ratio.max():.2f}",
-            }
-        )
+        own: dict[str, object] = {"dim": dim, "solver": solver, "prices": " ".join(f"{price:.2e}" for price in prices)}
+        for way in WAYS:
+            ratio = (A @ prices / t)[[row["way"] == way for row in mine]]
+            own[f"{way}: estimate over measured"] = f"{ratio.min():.2f} to {ratio.max():.2f}" if len(ratio) else ""
+        found.append(own)
     return found
 
 
