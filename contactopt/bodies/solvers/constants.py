@@ -7,7 +7,9 @@ from __future__ import annotations
 
 # `python -m experiments.questions.body_solvers` measures time and memory of every solver over the number of unknowns.
 PARDISO_FROM = 5_000  # unknowns of a 3D body from which PARDISO is faster than SuperLU
-FACTORS_UP_TO = {"superlu": 100_000, "pardiso": 200_000}  # unknowns of a 3D body that is factorised
+
+# `python -m experiments.questions.ways` compares whole solves; multigrid takes less than half the time of factors beyond these limits.
+FACTORS_UP_TO = {"superlu": 26_000, "pardiso": 70_000}  # unknowns of a 3D body that is factorised
 
 # `python -m experiments.questions.solver_constants` compares the elimination orders.
 LEAF = 48  # nodes of a piece of the mesh that nested dissection does not cut further
