@@ -26,8 +26,8 @@ import scipy.sparse as sp
 
 from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
-from contactopt.bodies.solvers import factors_of
 from contactopt.bodies.protocol import AssembledBody, Body
+from contactopt.bodies.solvers import factors_of
 from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
@@ -278,7 +278,9 @@ def reduce_bodies(
         contact, largest = (max(getattr(b, size) for b in assembled) for size in ("interface_unknowns", "unknowns"))
         if _filling(maps) ** 0.5 > MOST_EXPLICIT:
             contact = MOST_EXPLICIT + 1
-        Q = form_of(contact, largest, scene.dim, any(b.iterates(solver) for b in assembled), factors_of(solver, scene.dim))
+        Q = form_of(
+            contact, largest, scene.dim, any(b.iterates(solver) for b in assembled), factors_of(solver, scene.dim)
+        )
     log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, n)
     if Q == "explicit":
         check_dense(round(_filling(maps) ** 0.5))

@@ -32,7 +32,16 @@ from experiments.report import write  # noqa: E402
 
 PLANE, SPACE = 1230, 29  # elements across the half-width
 FACTOR = 1e6  # penalty stiffness over E / h
-CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))  # of C3D8, in its order
+CORNERS = (
+    (0, 0, 0),
+    (1, 0, 0),
+    (1, 1, 0),
+    (0, 1, 0),
+    (0, 0, 1),
+    (1, 0, 1),
+    (1, 1, 1),
+    (0, 1, 1),
+)  # of C3D8, in its order
 LIMIT = 1200.0  # seconds for one run of ccx
 
 
@@ -54,13 +63,20 @@ def solid_deck(scene: Scene, factor: float) -> str:
         lines.append(f"*ELEMENT, TYPE=C3D8, ELSET={name}")
         lines += [f"{i}, " + ", ".join(map(str, own)) for i, own in enumerate(corners.T, first)]
         lines += [f"*MATERIAL, NAME={name}\n*ELASTIC\n{STIFF:.6e}, 0.3\n*SOLID SECTION, ELSET={name}, MATERIAL={name}"]
-        for boundary, components in (("symmetry x", (1,)), ("symmetry y", (2,)), ("bottom", (1, 2, 3)), ("top", (1, 2))):
+        for boundary, components in (
+            ("symmetry x", (1,)),
+            ("symmetry y", (2,)),
+            ("bottom", (1, 2, 3)),
+            ("top", (1, 2)),
+        ):
             if boundary in mesh.boundaries and (boundary, body) != ("top", 1):
                 nodes = np.unique(mesh.facets[:, np.asarray(mesh.boundaries[boundary])]) + start + 1
                 held += [f"{n}, {c}, {c}" for n in nodes for c in components]
         facets = np.asarray(mesh.boundaries["top" if body else "contact"])
         side = f"S{2 if body else 1}"  # the faces below and above a brick
-        surfaces.append(f"*SURFACE, NAME=SURFACE{name}\n" + "\n".join(f"{e + first}, {side}" for e in mesh.f2t[0, facets]))
+        surfaces.append(
+            f"*SURFACE, NAME=SURFACE{name}\n" + "\n".join(f"{e + first}, {side}" for e in mesh.f2t[0, facets])
+        )
         first += corners.shape[1]
     top = np.unique(meshes[0].facets[:, np.asarray(meshes[0].boundaries["top"])]) + 1
     tied = [f"*EQUATION\n2\n{n}, 3, 1., {top[0]}, 3, -1." for n in top[1:]]
@@ -133,7 +149,8 @@ def compared(program: str, name: str, scene: Scene, text: str, limit: float) -> 
     error = "" if moved is None else float(np.abs(moved[:, : U.shape[1]] - U).max() / np.abs(U).max())
     ratio = found["CPU [s]"] / own["CPU [s]"]
     return [
-        head | {"solver": "contactopt", **own, "displacements, largest difference": "reference", "over contactopt": 1.0},
+        head
+        | {"solver": "contactopt", **own, "displacements, largest difference": "reference", "over contactopt": 1.0},
         head | {"solver": "ccx", **found, "displacements, largest difference": error, "over contactopt": ratio},
     ]
 
@@ -158,7 +175,13 @@ def main() -> None:
     plane_deck = deck(model(plane), Contact(contact.law, contact.stiffness, contact.stick, "top"))
     rows = compared(program, "punch in the plane", plane, plane_deck, limit)
     rows += compared(program, "punch in space", space, solid_deck(space, FACTOR), limit)
-    write("calculix_large", "CalculiX at a hundred thousand unknowns", TEXT.format(mu=MU, factor=FACTOR), {"rows": rows}, {})
+    write(
+        "calculix_large",
+        "CalculiX at a hundred thousand unknowns",
+        TEXT.format(mu=MU, factor=FACTOR),
+        {"rows": rows},
+        {},
+    )
 
 
 if __name__ == "__main__":

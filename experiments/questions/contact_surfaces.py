@@ -139,9 +139,17 @@ def pairs(scene: Scene, ratios: tuple[float, ...]) -> Iterator[tuple[float, Inte
 def judge(name: str, ratio: float, problem: InterfaceProblem) -> dict[str, object]:
     P = preconditioner(problem, "laplacian")
     D = deflated(P, problem.Q, smooth_motions(problem))
-    row = {"surface": name, "contacts": problem.contacts, "ratio": ratio, "none: iterations": iterations(None, problem.Q)}
+    row = {
+        "surface": name,
+        "contacts": problem.contacts,
+        "ratio": ratio,
+        "none: iterations": iterations(None, problem.Q),
+    }
     for title, chosen in (("laplacian", P), ("deflated", D)):
-        row |= {f"{title}: condition": condition(chosen, problem.Q), f"{title}: iterations": iterations(chosen, problem.Q)}
+        row |= {
+            f"{title}: condition": condition(chosen, problem.Q),
+            f"{title}: iterations": iterations(chosen, problem.Q),
+        }
     return row
 
 
@@ -253,7 +261,13 @@ def main() -> None:
     for n in AROUND:
         rows += [judge("closed ring, in the plane", *pair) for pair in pairs(ring(n), RATIOS)]
     tables = {"rows": rows, "many": [many(MANY)]}
-    write("contact_surfaces", "`laplacian` on contact surfaces of any shape", report(rows), tables, {"condition": draw(rows)})
+    write(
+        "contact_surfaces",
+        "`laplacian` on contact surfaces of any shape",
+        report(rows),
+        tables,
+        {"condition": draw(rows)},
+    )
 
 
 if __name__ == "__main__":

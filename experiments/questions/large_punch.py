@@ -96,7 +96,9 @@ def phases(elements: int, cores: int) -> list[dict[str, object]]:
     def timed(phase: str, act: Callable[[], Any]) -> Any:
         begin = time.perf_counter(), time.process_time()
         made = act()
-        rows.append({"phase": phase, "wall [s]": time.perf_counter() - begin[0], "CPU [s]": time.process_time() - begin[1]})
+        rows.append(
+            {"phase": phase, "wall [s]": time.perf_counter() - begin[0], "CPU [s]": time.process_time() - begin[1]}
+        )
         return made
 
     scene = scenes.flat_punch(3)

@@ -101,7 +101,9 @@ def draw(places: Places) -> Figure:
         m = np.geomspace(30, 2e4, 120)
         best = np.array([[WAYS.index(cheapest(int(b), int(a), dim, solver)) for a in n] for b in m])
         ax.contourf(n, m, best, levels=[-0.5, 0.5, 1.5, 2.5], colors=[COLOURS[way] for way in WAYS], alpha=0.45)
-        ax.set(xscale="log", yscale="log", xlabel="unknowns of the largest body [-]", ylabel="of them on the contact [-]")
+        ax.set(
+            xscale="log", yscale="log", xlabel="unknowns of the largest body [-]", ylabel="of them on the contact [-]"
+        )
         ax.set_title(f"{dim}D, factors by {solver}", fontsize=10)
         ax.plot(*np.array(places[dim]).T, "o", mfc="white", mec="black", ms=5)
     for way in WAYS:
@@ -170,7 +172,9 @@ def main(rows: list[dict]) -> None:
 
 def before() -> list[dict]:
     with open(REPORTS / "ways" / "rows.csv", newline="") as file:
-        return [{k: number(v) for k, v in row.items()} for row in csv.DictReader(x for x in file if not x.startswith("#"))]
+        return [
+            {k: number(v) for k, v in row.items()} for row in csv.DictReader(x for x in file if not x.startswith("#"))
+        ]
 
 
 if __name__ == "__main__":

@@ -124,7 +124,9 @@ class VCycle:
     Arguments as in contactopt.bodies.solvers.system.System, and the threads that share large products. Raises InputError if the package pyamg is missing.
     """
 
-    def __init__(self, A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, points: np.ndarray, crew: Crew):
+    def __init__(
+        self, A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, points: np.ndarray, crew: Crew
+    ):
         blocks, self.place, present = nodal_blocks(A, node, component, len(points))
         self.scale = _inverse_root(A.diagonal())
         self.size = blocks.shape[0]
@@ -138,7 +140,11 @@ class VCycle:
             blocks = galerkin(P, blocks, crew)
             coarse = _inverse_root(blocks.diagonal())
             P = _scaled(P, np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0), coarse).tocsr()
-            self.levels.append(Level(level, SINGLE(largest_eigenvalue(level)), SparseProduct(P, crew), SparseProduct(P.T.tocsr(), crew)))
+            self.levels.append(
+                Level(
+                    level, SINGLE(largest_eigenvalue(level)), SparseProduct(P, crew), SparseProduct(P.T.tocsr(), crew)
+                )
+            )
             scale = coarse
         dense = blocks.toarray() * scale * scale[:, None]
         self.coarsest = la.pinvh(dense, rtol=1e-12).astype(SINGLE)

@@ -126,7 +126,9 @@ def _rows(A: sp.csr_matrix | sp.bsr_matrix, first: int, stop: int) -> sp.csr_mat
         return A
     entries = slice(int(A.indptr[first]), int(A.indptr[stop]))
     size = A.blocksize if A.format == "bsr" else (1, 1)
-    part = type(A)(((stop - first) * size[0], A.shape[1]), **({"blocksize": size} if A.format == "bsr" else {}), dtype=A.dtype)
+    part = type(A)(
+        ((stop - first) * size[0], A.shape[1]), **({"blocksize": size} if A.format == "bsr" else {}), dtype=A.dtype
+    )
     # Given to the constructor, parts of arrays would be copied.
     part.data, part.indices = A.data[entries], A.indices[entries]
     part.indptr = A.indptr[first : stop + 1] - A.indptr[first]

@@ -35,7 +35,9 @@ from contactopt.solving.preconditioners.constants import ALONG, EDGE, SPLIT
 
 ACCURACY = 1e-4  # of the rational function
 THINNEST = 1e-2  # nodal area over mass, relative to the mean, of a contact on an axis
-DISTORTED = np.log(2)  # of the area of a cell in the chart over that in space: beyond, the chart has no directions there
+DISTORTED = np.log(
+    2
+)  # of the area of a cell in the chart over that in space: beyond, the chart has no directions there
 PIECE = 0.25  # shift over the least eigenvalue of a piece of the surface that is as long as this one
 
 Act = Callable[[np.ndarray], np.ndarray]
