@@ -31,7 +31,7 @@ def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
 
 def elastic_energy(reduction: Reduction, solution: Solution) -> float:
     """Elastic energy of all bodies together, the sum of U' A U / 2 [force length]."""
-    displaced = reduction.displaced(solution.reactions, solution.multipliers)
+    displaced = reduction.displaced(solution)
     return sum(body.energy(U) for body, U in zip(reduction.bodies, displaced))
 
 
