@@ -208,7 +208,7 @@ def fit(
         return stacked(model.slopes(size * x), False) * size
 
     found = least_squares(
-        misfit, first / size, jacobian, (low / size, high / size), "trf", 1e-12, 1e-12, 1e-12, max_nfev=evaluations
+        misfit, first / size, jacobian, (low / size, high / size), "trf", 1e-10, 1e-9, 1e-10, max_nfev=evaluations
     )
     values = size * found.x
     J = stacked(model.slopes(values), False)
