@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 import turned
 from conftest import MATERIAL, block, two_blocks
 
-from contactopt import InputError, Part, Rigid, Scene, Support, reduce, reduce_bodies, scenes, solve
+from contactopt import InputError, InterfaceProblem, Part, Rigid, Scene, Support, reduce, reduce_bodies, scenes, solve
 from contactopt.analysis.paths import follow
 from contactopt.analysis.quantities import elastic_energy
 from contactopt.bodies import BODIES
@@ -256,15 +257,18 @@ def test_a_large_array_is_announced_and_a_huge_one_refused(monkeypatch, caplog):
     from contactopt.problem import operators
 
     scene = scenes.flat_punch(2, elements=4)  # 5 contacts: 10 x 10 entries, 800 bytes
-    monkeypatch.setattr(operators, "NOTABLE", 800)
+    monkeypatch.setattr(operators, "NOTABLE_BYTES", 800)
     with caplog.at_level("INFO"):
         reduce(scene, Q="explicit")
     assert "10 x 10 entries: 800 bytes" in caplog.text and "solver superlu" in caplog.text
     assert "explicit Q of 10 unknowns" in caplog.text
-    monkeypatch.setattr(operators, "MOST", 799)
+    monkeypatch.setattr(operators, "MOST_BYTES", 799)
     with pytest.raises(InputError, match="would take 800 bytes, more than 799; take Q = 'implicit'"):
         reduce(scene, Q="explicit")
     assert reduce(scene, Q="implicit").contacts == 5
+    rows = sp.csr_array(np.eye(10))
+    with pytest.raises(InputError, match="would take 800 bytes, more than 799"):  # the same limit for sparse rows
+        InterfaceProblem(rows, np.zeros((5, 2)), 0.3).explicit()
 
 
 def test_meshes_keep_their_own_mapping():

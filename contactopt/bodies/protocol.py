@@ -26,9 +26,7 @@ if TYPE_CHECKING:
     from contactopt.bodies.fields import Fields
     from contactopt.problem.chart import Chart
     from contactopt.problem.convolution import Kernel
-
-# (X (rows, j), relative accuracy or None for the best there is) -> T C T' X (rows, j)
-Product = Callable[[np.ndarray, float | None], np.ndarray]
+    from contactopt.problem.operators import Product
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,6 +238,9 @@ class Body(Protocol):
 
         U (n,) is the displacement under the contact forces `force` (n,).
         """
+
+    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+        """For each element the product of the stress errors of U and W (contactopt.bodies.fields); (0,) without elements."""
 
     def fields(self, U: np.ndarray) -> Fields | None:
         """Displacement and stress at the displacement U (n,); None for a body without any."""

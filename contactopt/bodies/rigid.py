@@ -7,14 +7,19 @@ forces that hold the body are known from U.
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import Product, Surface
+from contactopt.bodies.protocol import Surface
 from contactopt.errors import InputError
+from contactopt.problem.operators import Product
 from contactopt.scenes.scene import Rigid, Scene
+
+log = logging.getLogger(__name__)
+FLAT = 1e-3  # normals of a surface that differ by less than this are one direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +69,13 @@ class RigidBody:
         if self.part.normal is not None:
             own = np.array(self.part.normal, dtype=float)
             normals = np.tile(own[:, None] / np.linalg.norm(own), k)
+        elif self.part.gap is not None and np.ptp(normals, axis=1).max(initial=0.0) > FLAT:
+            log.warning(
+                "the gap of rigid body '%s' is taken along the normals of the curved surface of body '%s', because no normal is "
+                "given; give Rigid(normal=...) if the gap is measured along one direction.",
+                self.name,
+                other.body,
+            )
         fixed = np.array([name not in self._force for name in self.components])
         trace = [sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, 2 * dim)) for c in range(dim)]
         held = np.tile(fixed[:, None], k)
@@ -118,6 +130,9 @@ class RigidBody:
 
     def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
         return 0.0
+
+    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+        return np.zeros(0)
 
     def energy(self, U: np.ndarray) -> float:
         return 0.0

@@ -103,7 +103,7 @@ class Step:
         chosen = [pair.name for pair in which.pairs(self.reduction.scene)]
         for pair, made in zip(self.reduction.scene.pairs, self.problem.pairs):
             if pair.name in chosen:
-                law = find_law(pair.law).of_place(np.ones(made.last - made.first), areas[made.contacts])
+                law = find_law(pair.law).of_place(np.ones(made.stop - made.start), areas[made.contacts])
                 out[made.contacts] = getattr(law, law.parameters[0])
         return out
 

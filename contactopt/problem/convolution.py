@@ -17,8 +17,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.fft import fft, ifft, irfft, next_fast_len, rfft, rfftn
 
+from contactopt.problem.counter import Counter
 from contactopt.problem.operators import InterfaceOperator, check_dense
 
 SINGLE = 2e-6  # accuracy of products from which on single precision serves
@@ -29,6 +29,8 @@ Symbols = dict[tuple[int, int], np.ndarray]  # (a, b) with a <= b -> real array
 
 def embedding(grid: tuple[int, ...]) -> tuple[int, ...]:
     """Sizes M of the padded grid: twice a number that is at least that of the contacts and easy to halve and to transform."""
+    from scipy.fft import next_fast_len
+
     return tuple(2 ** (LEVELS + 1) * int(next_fast_len(-(-n // 2**LEVELS), real=True)) for n in grid)
 
 
@@ -54,6 +56,8 @@ class Kernel:
     @classmethod
     def of_coefficients(cls, grid: tuple[int, ...], coefficients: Symbols) -> Kernel:
         """From the coefficients K_ab at distances 0 to M / 2 along each axis, M as `embedding` gives it."""
+        from scipy.fft import rfftn
+
         padded, symbols = embedding(grid), {}
         for (a, b), part in coefficients.items():
             odd, whole = odd_axes(a, b, len(grid)), part
@@ -176,6 +180,8 @@ def _negated(high: np.ndarray, axis: int, odd: tuple[bool, ...]) -> np.ndarray:
 
 def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
     """Fourier transform of x (*grid), padded by zeros; rows that hold nothing but padding are skipped."""
+    from scipy.fft import fft, rfft
+
     workers = workers_for(padded)
     spectrum = rfft(x, n=padded[-1], axis=-1, workers=workers)
     if len(padded) == 2:
@@ -185,6 +191,8 @@ def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
 
 def backward(spectrum: np.ndarray, padded: tuple[int, ...], grid: tuple[int, ...]) -> np.ndarray:
     """The part (*grid) of the inverse transform; `spectrum` is overwritten."""
+    from scipy.fft import ifft, irfft
+
     workers = workers_for(padded)
     if len(padded) == 2:
         spectrum = ifft(spectrum, axis=0, overwrite_x=True, workers=workers)[: grid[0]]
@@ -203,10 +211,10 @@ def workers_for(padded: tuple[int, ...]) -> int:
 class Convolution(InterfaceOperator):
     """The interface operator of a kernel, in double precision, or in single precision where that is accurate enough."""
 
-    def __init__(self, kernel: Kernel, accuracy: float | None = None):
+    def __init__(self, kernel: Kernel, accuracy: float | None = None, counter: Counter | None = None):
         self.kernel = kernel
-        count = int(np.prod(kernel.grid))
-        super().__init__(self._product, np.tile(kernel.diagonal, count), kernel.entries, accuracy)
+        diagonal = np.tile(kernel.diagonal, int(np.prod(kernel.grid)))
+        super().__init__(self._product, diagonal, kernel.entries, accuracy, counter=counter)
 
     def _product(self, X: np.ndarray, accuracy: float | None) -> np.ndarray:
         every = tuple(range(self.kernel.dim))
@@ -218,12 +226,10 @@ class Convolution(InterfaceOperator):
             out[:, column] = np.moveaxis(moved, 0, -1).ravel()
         return out
 
-    def scaled(self, factor: float, added: np.ndarray) -> InterfaceOperator:
+    def scaled(self, factor: float, added: np.ndarray, counter: Counter | None = None) -> InterfaceOperator:
         if np.any(added):
-            return super().scaled(factor, added)
-        return Convolution(self.kernel.scaled(factor), self.accuracy)
+            return super().scaled(factor, added, counter)
+        return Convolution(self.kernel.scaled(factor), self.accuracy, counter)
 
     def loosened(self, accuracy: float) -> InterfaceOperator:
-        loose = Convolution(self.kernel, accuracy)
-        loose.count = self.count
-        return loose
+        return Convolution(self.kernel, accuracy, self.counter)

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.problem.counter import Counter
+
 Act = Callable[[np.ndarray], np.ndarray]
 
 
@@ -23,7 +25,7 @@ class CoupledForm:
     cycle      F (N,) -> B F, symmetric positive definite and close to A^-1 F, e.g. one V-cycle of multigrid per body
     rest       r (n,) -> the part of Q r that needs no iteration: plates on supports, bodies with factors [length]
     diagonal   (N,) diagonal of A [force / length]
-    count      number of applications of B so far, in a list that scaled forms share
+    counter    counts the applications of B; scaled forms share it
     """
 
     trace: sp.csr_matrix
@@ -31,7 +33,7 @@ class CoupledForm:
     cycle: Act
     rest: Act
     diagonal: np.ndarray
-    count: list[int] = field(default_factory=lambda: [0])
+    counter: Counter = field(default_factory=Counter)
 
     @property
     def size(self) -> int:
@@ -40,11 +42,12 @@ class CoupledForm:
 
     @property
     def cycles(self) -> int:
-        return self.count[0]
+        """Number of applications of B so far."""
+        return self.counter.total
 
     def approximate(self, F: np.ndarray) -> np.ndarray:
         """B F (N,), counted."""
-        self.count[0] += 1
+        self.counter.add()
         return self.cycle(F)
 
     def moved(self, X: np.ndarray, r: np.ndarray) -> np.ndarray:

@@ -18,14 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.optimize import linprog
 
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.operators import InterfaceOperator, asymmetry
 from contactopt.problem.scaling import dimensionless
 
 DIRECTIONS = 16  # of the polygon in each cone, in 3D
-LARGEST = 3_000_000  # entries of the program up to which it is tried
+MOST_ENTRIES = 3_000_000  # entries of the program up to which it is tried
 EXACT = 1e-12  # relative size of what rounding leaves of a zero in the conditions on a ray
 MARGIN = 1e-7  # least -(q' e + s' z) of a ray of size one, over the size of its terms
 POLISH = 3  # least-squares steps
@@ -50,7 +49,7 @@ class Infeasible:
 def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasible | None:
     """A proof that the problem has no solution, or None: then it may have one or not.
 
-    Laws without a cone of forces, operators, and programs of more than LARGEST entries are not looked at. time_limit [s] bounds the
+    Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not looked at. time_limit [s] bounds the
     program. A positive definite Q without a plate needs none: every such problem has a solution.
     """
     if (
@@ -60,21 +59,21 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasi
     ):
         return None
     entries = problem.Q.nnz if sp.issparse(problem.Q) else problem.Q.size
-    if entries / problem.dim * (2 if problem.dim == 2 else DIRECTIONS) > LARGEST or _definite(problem):
+    if entries / problem.dim * (2 if problem.dim == 2 else DIRECTIONS) > MOST_ENTRIES or _definite(problem):
         return None
     scaled, scales = dimensionless(problem)
-    still = scaled.Q if sp.issparse(scaled.Q) else sp.csr_array(scaled.Q)
-    still = _without_ridge(problem, still)
-    ray = _program(scaled, still, time_limit)
+    Q = scaled.Q if sp.issparse(scaled.Q) else sp.csr_array(scaled.Q)
+    Q = _without_ridge(problem, Q)
+    ray = _program(scaled, Q, time_limit)
     if ray is None:
         return None
     for _ in range(POLISH):
-        if verified(scaled, still, *ray):
+        if verified(scaled, Q, *ray):
             weights, motions = ray
             margin = -float(scaled.q[:, 0] @ weights + scaled.s @ motions) * scales.force * scales.length
             told = _sentence(scaled, weights, motions)
             return Infeasible(weights, motions * scales.multipliers / scales.length, margin, told)
-        ray = _polished(scaled, still, *ray)
+        ray = _polished(scaled, Q, *ray)
     log.info("a ray that would prove the problem infeasible did not stand the check")
     return None
 
@@ -115,6 +114,8 @@ def verified(problem: InterfaceProblem, Q: sp.csr_array, weights: np.ndarray, mo
 
 def _program(problem: InterfaceProblem, Q: sp.csr_array, time_limit: float) -> tuple[np.ndarray, np.ndarray] | None:
     """min q' e + s' z over rays with y, z in the unit box; None if it is not negative or there is no answer in time."""
+    from scipy.optimize import linprog
+
     k, d = problem.q.shape
     normal = np.arange(k) * d
     G = sp.hstack([sp.csr_array(Q.T[:, normal]), sp.csr_array(problem.V)], format="csr")  # g from (y, z)

@@ -36,7 +36,7 @@ FIRST, LOOSEST, TIGHTEST = 0.1, 0.1, 1e-2  # accuracy of a step: the first two, 
 INNER = 1e-2  # accuracy of the Schur complement of the model
 MARGIN = 1.5  # the model's Schur complement over that of a mean fit
 GIVEN = 1e-3  # accuracy of equilibrium under forces to start from
-MOST = 60  # conjugate gradient iterations towards it
+MOST_ITERATIONS = 60  # conjugate gradient iterations towards it
 
 Known = tuple[np.ndarray, np.ndarray, Moved]  # reactions (k, dim), multipliers (p,) and Q r
 
@@ -165,7 +165,7 @@ def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN) -> np.
     """Displacements X (N,) close to A^-1 trace' r, by conjugate gradients with V-cycles."""
     X, residual = np.zeros(form.size), np.asarray(form.trace.T @ r.ravel())
     p, size, goal = np.zeros(form.size), 1.0, 0.0
-    for step in range(MOST):
+    for step in range(MOST_ITERATIONS):
         check_time()
         z = form.approximate(residual)
         size, previous = float(np.einsum("i,i", residual, z)), size
