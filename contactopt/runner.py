@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.analysis.accuracy import Estimate, refine
-from contactopt.analysis.paths import PathResult, follow
+from contactopt.analysis.paths import PathResult, solve_states
 from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
 from contactopt.analysis.resultants import tables
 from contactopt.analysis.solve_scene import Options, Solved
-from contactopt.analysis.zone import solve_zone
 from contactopt.cards import card, count, line
 from contactopt.errors import InputError
 from contactopt.figures.output import PAGE, draw, earlier_files, squeeze, write
@@ -289,16 +288,14 @@ def _form(Q: str, preconditioner: str | None) -> str:
 def _solve(
     states: tuple[Scene, ...], accuracy: float | None, quantity: str | None, options: Options
 ) -> tuple[Solved, PathResult | None, Estimate | None]:
-    """One of three loops: refinement to an accuracy, a load path, or the contact zone of one scene."""
+    """The scene or its load path, on its own mesh or on meshes refined to an accuracy."""
     if (accuracy is None) != (quantity is None):
         raise InputError("accuracy and quantity belong together: the bound, and the name of what it bounds.")
     if accuracy is not None and quantity is not None:
         mesh, estimate = refine(states, quantity, accuracy, options)
-        return mesh.solved, mesh.path, estimate
-    if len(states) > 1:
-        path = follow(states, note=options.note, Q=options.Q, solver=options.solver, **options.of_solve)
-        return Solved(path.reduction, path.solution), path, None
-    return solve_zone(states[0], options=options), None, None
+        return mesh.solved, mesh.solved.path, estimate
+    solved = solve_states(states, options=options)
+    return solved, solved.path, None
 
 
 def _summary(

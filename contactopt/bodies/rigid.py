@@ -115,6 +115,25 @@ class RigidBody:
     def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         return np.asarray(self.at_rest + self.motions @ multipliers + np.roll(force, len(self.components)))
 
+    def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(len(U)), np.zeros(len(self.resultants))
+
+    def material_work(self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray) -> float:
+        return 0.0
+
+    def load_work(self, scene: Scene, part: Rigid, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
+        new = self.loaded(scene, part)
+        return float(dual @ (new.at_rest - self.at_rest) + weights @ (new.resultants - self.resultants))
+
+    def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(len(U)), np.zeros(len(U))
+
+    def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
+        return 0.0
+
+    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+        return np.zeros(0)
+
     def energy(self, U: np.ndarray) -> float:
         return 0.0
 

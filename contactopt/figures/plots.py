@@ -12,6 +12,8 @@ import numpy as np
 
 from contactopt.analysis.edges import contact_area, contact_edge
 from contactopt.analysis.status import contact_status
+from contactopt.derivatives.design import Design
+from contactopt.derivatives.fit import Fit
 from contactopt.figures.bodies import deformed, magnification, mirror_plane
 from contactopt.figures.style import ARROWS, BLUE, GREEN, GREY, ORANGE, make_axes, singular
 from contactopt.problem import InterfaceProblem, Solution
@@ -208,5 +210,36 @@ def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
         residual = [h["residual"] for h in solution.history]
         ax.semilogy(range(1, len(residual) + 1), residual, "o-", ms=3, color=colour, label=label)
     ax.set(xlabel="outer iteration", ylabel="natural-map residual [-]")
+    ax.legend(frameon=False)
+    return ax
+
+
+def fit(found: Fit, ax: Any = None) -> Any:
+    """What the model leaves of the data, over the standard deviation of the noise, state by state."""
+    ax = make_axes(ax)
+    for (name, measured), colour in zip(found.data.items(), (BLUE, ORANGE, GREEN, GREY)):
+        rest = (measured - found.model[name]) / (found.noise[name] or 1.0)
+        ax.plot(np.arange(len(rest)), rest, "o-", color=colour, lw=0.8, ms=4, label=name)
+    ax.axhline(0.0, color=GREY, lw=0.8)
+    ax.axhspan(-1.96, 1.96, color=GREY, alpha=0.12, lw=0, label="95 % of normal noise")
+    ax.set(xlabel="state", ylabel="(measured - computed) / noise")
+    ax.set_title("; ".join(f"{name} = {value:.4g}" for name, value in found.values.items()))
+    ax.legend(frameon=False)
+    return ax
+
+
+def design(found: Design, ax: Any = None) -> Any:
+    """The pressure of the designed contact over the place along the surface, and its mean."""
+    ax = make_axes(ax)
+    problem = found.reduction.problem
+    place = problem.chart.places[0]
+    order = np.argsort(place)
+    touching = problem.law.pressed(found.solution.reactions)
+    mean = float(np.average(found.pressure[touching], weights=problem.areas[touching]))
+    unit, stress = found.reduction.scene.units
+    ax.plot(place[order], found.pressure[order], "." if problem.dim == 3 else ".-", color=BLUE, label="pressure")
+    ax.axhline(mean, color=GREY, lw=0.8, label="mean over the contact")
+    ax.set(xlabel=f"place [{unit}]", ylabel=f"pressure [{stress}]", ylim=(0.0, 1.2 * found.peak))
+    ax.set_title(f"{found.reduction.scene.name}: largest over mean pressure {found.unevenness:.4f}")
     ax.legend(frameon=False)
     return ax

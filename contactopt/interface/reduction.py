@@ -38,6 +38,7 @@ from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
 from contactopt.problem.operators import (
     FORMS,
+    Interface,
     InterfaceOperator,
     Product,
     check_dense,
@@ -137,9 +138,7 @@ class Reduction:
         _check_same(self.scene, scene)
         start = time.perf_counter()
         bodies = tuple(old.loaded(scene, part) for old, part in zip(self.bodies, scene.parts))
-        q, V, s = _linear_terms(bodies, self.maps, self.couplings)
-        law = _law(scene.pairs, self.couplings)
-        problem = replace(self.problem, q=q, V=V, s=s, law=law, motions=_names(bodies))
+        problem = _problem(scene, self.problem.Q, bodies, self.maps, self.couplings)
         seconds = {"load": time.perf_counter() - start}
         return replace(self, scene=scene, problem=problem, bodies=bodies, seconds=seconds)
 
@@ -267,14 +266,8 @@ def reduce_bodies(
     seconds["factorise"] = time.perf_counter() - start
 
     start = time.perf_counter()
-    q, V, s = _linear_terms(bodies, maps, coupled)
     made = _operator(bodies, maps, coupled) if Q == "implicit" else _entries(bodies, maps)
-    areas = np.concatenate([part.areas for part in coupled])
-    points = np.concatenate([part.positions for part in coupled], axis=1)
-    pairs = _pairs(scene, coupled)
-    chart = pairs[0].chart if len(pairs) == 1 else None
-    law, names = _law(scene.pairs, coupled), _names(bodies)
-    problem = InterfaceProblem(made, q, law, V, s, areas, points, chart, pairs, names)
+    problem = _problem(scene, made, bodies, maps, coupled)
     seconds["compliance"] = time.perf_counter() - start
     return Reduction(scene, problem, bodies, maps, coupled, seconds)
 
@@ -283,15 +276,18 @@ def _map_of(
     body: AssembledBody, sides: Sequence[tuple[AssembledBody, AssembledBody]], couplings: Sequence[Coupling]
 ) -> sp.csr_matrix:
     """B (k dim, n) of a body: the maps of the pairs that it takes part in, with their signs, and zeros elsewhere."""
-    blocks: list[sp.csr_matrix | int] = []
-    width = 0
-    for (upper, lower), made in zip(sides, couplings):
-        rows = made.frames.shape[0] * made.frames.shape[1]
-        own = made.upper if body is upper else -made.lower if body is lower else None
-        blocks.append(rows if own is None else own)
-        width = width if own is None else own.shape[1]
-    filled = [sp.csr_matrix((block, width)) if isinstance(block, int) else block for block in blocks]
-    return filled[0] if len(filled) == 1 else sp.csr_matrix(sp.vstack(filled, format="csr"))
+    ends = np.cumsum([0, *(made.frames.shape[0] * made.frames.shape[1] for made in couplings)])
+    blocks = [
+        (first, made.upper if body is upper else -made.lower)
+        for first, (upper, lower), made in zip(ends, sides, couplings)
+        if body is upper or body is lower
+    ]
+    width = blocks[0][1].shape[1]
+    entries = [(first, sp.coo_matrix(block)) for first, block in blocks]
+    rows = np.concatenate([first + block.row for first, block in entries])
+    columns = np.concatenate([block.col for _, block in entries])
+    values = np.concatenate([block.data for _, block in entries])
+    return sp.csr_matrix((values, (rows, columns)), (int(ends[-1]), width))
 
 
 def _pairs(scene: Scene, couplings: Sequence[Coupling]) -> tuple[Pair, ...]:
@@ -327,6 +323,10 @@ def _operator(
     kernels = [body.convolution(B) for body, B in zip(bodies, maps) if body.moved(B).any()]
     if kernels and all(kernel is not None for kernel in kernels):
         known = [kernel for kernel in kernels if kernel is not None]
+        if len({kernel.padded for kernel in known}) > 1:
+            raise InputError(
+                "one half-space repeats itself periodically and the other does not; make both periodic or none."
+            )
         return Convolution(sum(known[1:], known[0]))
     moved = [body.moved(B) for body, B in zip(bodies, maps)]
     moving = [(body, B, _rows(B)) for body, B, moves in zip(bodies, maps, moved) if moves.any()]
@@ -362,30 +362,33 @@ def _filling(maps: Sequence[sp.csr_matrix]) -> int:
 def _entries(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarray | sp.csr_array:
     """Q by its entries, symmetric to the last digit: an array, or sparse rows where most pairs share no body."""
     n = maps[0].shape[0]
-    thin = _filling(maps) < SPARSE * n**2
-    Q = sp.csr_array((n, n)) if thin else np.zeros((n, n))
-    for body, B in zip(bodies, maps):
-        if not body.moved(B).any():
-            continue
-        rows = _rows(B)
-        if thin:
-            place = np.repeat(rows, len(rows)), np.tile(rows, len(rows))
-            Q = Q + sp.csr_array((body.compliance(B[rows]).ravel(), place), (n, n))
-        elif len(rows) == n:
-            Q += body.compliance(B)
+    parts = [(_rows(B), body.compliance(B[_rows(B)])) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    if _filling(maps) < SPARSE * n**2:
+        rows = np.concatenate([np.repeat(rows, len(rows)) for rows, _ in parts])
+        columns = np.concatenate([np.tile(rows, len(rows)) for rows, _ in parts])
+        return sp.csr_array((np.concatenate([own.ravel() for _, own in parts]), (rows, columns)), (n, n))
+    Q = np.zeros((n, n))
+    for rows, own in parts:
+        if len(rows) == n:
+            Q += own
         else:
-            Q[np.ix_(rows, rows)] += body.compliance(B[rows])
+            Q[np.ix_(rows, rows)] += own
     return Q
 
 
-def _linear_terms(
-    bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q (k, dim), V (k dim, p) and s (p,)."""
+def _problem(
+    scene: Scene, Q: Interface, bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
+) -> InterfaceProblem:
+    """The interface problem of a scene whose bodies and couplings are made and whose Q is known."""
     gap = np.concatenate([made.gap for made in couplings])
     q = np.zeros((len(gap), maps[0].shape[0] // max(len(gap), 1)))
     q[:, 0] = gap
     for body, B in zip(bodies, maps):
         q += (B @ body.at_rest).reshape(q.shape)
     V = np.concatenate([B @ body.motions for body, B in zip(bodies, maps)], axis=1)
-    return q, V, np.concatenate([body.resultants for body in bodies])
+    s = np.concatenate([body.resultants for body in bodies])
+    areas = np.concatenate([made.areas for made in couplings])
+    points = np.concatenate([made.positions for made in couplings], axis=1)
+    pairs = _pairs(scene, couplings)
+    chart = pairs[0].chart if len(pairs) == 1 else None
+    return InterfaceProblem(Q, q, _law(scene.pairs, couplings), V, s, areas, points, chart, pairs, _names(bodies))

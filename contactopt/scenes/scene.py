@@ -178,16 +178,22 @@ class HalfSpace:
             )
         if self.depth is not None:
             check_number(f"the depth of half-space '{self.name}'", self.depth, low=0.0)
+        if not isinstance(self.periodic, (bool, np.bool_)):
+            raise InputError(f"half-space '{self.name}': periodic must be True or False; got {short(self.periodic)}.")
 
     def ticks(self, elements: int, zone: float | None, axes: int) -> tuple[np.ndarray, ...]:
         """Places along each of the axes; InputError unless they are evenly spaced and growing."""
         given = self.points(elements, zone) if callable(self.points) else self.points
+        if not isinstance(given, (tuple, list, np.ndarray)) or len(given) == 0:
+            raise InputError(
+                f"half-space '{self.name}': its points must be given by one row of places per axis; got {short(given)}."
+            )
         rows = (given,) if np.ndim(given[0]) == 0 else tuple(given)
         if len(rows) != axes:
             raise InputError(
                 f"half-space '{self.name}': its points need {axes} rows of places, one per axis; got {len(rows)}."
             )
-        made = tuple(real_array(f"the points of half-space '{self.name}'", row) for row in rows)
+        made = tuple(real_array(f"a row of points of half-space '{self.name}'", row) for row in rows)
         for row in made:
             steps = np.diff(row)
             if row.ndim != 1 or len(row) < 4 or steps.min() <= 0 or np.ptp(steps) > 1e-6 * steps.mean():
