@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from contactopt.scenes.scene import Scene
 from contactopt.solving.methods import default_method, find_method
 
 if TYPE_CHECKING:
+    from contactopt.adaptivity.loop import AdaptedEstimate
     from contactopt.scenes.scene_files import SceneFile
 
 Note = Callable[[str], None]
@@ -55,7 +56,7 @@ class Result:
     zones: tuple[float, ...]
     summary: dict[str, Any]
     path: PathResult | None = None
-    estimate: Estimate | None = None
+    estimate: Estimate | AdaptedEstimate | None = None
 
     def __repr__(self) -> str:
         s = self.summary
@@ -139,6 +140,7 @@ def run(
     elements: int | None = None,
     accuracy: float | None = None,
     quantity: str | None = None,
+    adaptive: bool = False,
     figures: Sequence[str] = ("png",),
     html: bool = False,
     note: Note = lambda text: None,
@@ -160,6 +162,8 @@ def run(
     accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
         sentence in `Result.estimate` says why not; `elements` only scales the first mesh
     quantity : a name in contactopt.analysis.quantities.QUANTITIES
+    adaptive : whether meshes are refined only where the quantity needs it (contactopt.adaptivity), each body by itself, and not
+        everywhere; quadrilaterals become triangles. More quantities can be bounded then, see contactopt.derivatives.outputs
         All arguments from `method` to here may stand in a scene file; those given here win.
     figures : the formats in which figures are written, of png, svg and pdf; (): none are drawn, which saves half of the time
         of a small scene
@@ -188,13 +192,13 @@ def run(
     names = {"normal": normal, "tangential": tangential, "preconditioner": preconditioner}
     given = {key: choose(key, name) for key, name in names.items() if choose(key, name) is not None}
     method = choose("method", method) or default_method(given)
-    accuracy, quantity = choose("accuracy", accuracy), choose("quantity", quantity)
+    aim = _aim(choose("accuracy", accuracy), choose("quantity", quantity), choose("adaptive", adaptive or None, False))
     chosen = find_method(method, **given)
     backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
     form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
     options = Options(form, choose("solver", solver, "auto"), chosen, choose("tol", tol, 1e-8), note=note)
     try:
-        return _finish(states, out, files, method, backends, options, accuracy, quantity, start)
+        return _finish(states, out, files, method, backends, options, aim, start)
     except InputError as error:
         raise error if file is None else file.located(error) from error
 
@@ -217,14 +221,13 @@ def _finish(
     method: str,
     backends: tuple[str, str],
     options: Options,
-    accuracy: float | None,
-    quantity: str | None,
+    aim: Aim | None,
     start: float,
 ) -> Result:
     """Solve the states, and write figures and files; `start` is when the clock began."""
     if out is not None:
         check_folder(Path(out))
-    solved, path, estimate = _solve(states, accuracy, quantity, options)
+    solved, path, estimate = _solve(states, aim, options)
     seconds = dict(solved.solution.seconds)
     with _clock(seconds, "recover"):
         fields = recover(solved.reduction, solved.solution)
@@ -285,21 +288,48 @@ def _form(Q: str, preconditioner: str | None) -> str:
     return "implicit"
 
 
-def _solve(
-    states: tuple[Scene, ...], accuracy: float | None, quantity: str | None, options: Options
-) -> tuple[Solved, PathResult | None, Estimate | None]:
-    """The scene or its load path, on its own mesh or on meshes refined to an accuracy."""
+class Aim(NamedTuple):
+    """An accuracy to be reached: the bound, what it bounds, and whether meshes are refined only where that needs it."""
+
+    accuracy: float
+    quantity: str
+    adaptive: bool
+
+
+def _aim(accuracy: float | None, quantity: str | None, adaptive: bool) -> Aim | None:
     if (accuracy is None) != (quantity is None):
         raise InputError("accuracy and quantity belong together: the bound, and the name of what it bounds.")
-    if accuracy is not None and quantity is not None:
-        mesh, estimate = refine(states, quantity, accuracy, options)
+    if accuracy is None or quantity is None:
+        if adaptive:
+            raise InputError("adaptive refinement needs an aim: give an accuracy and a quantity.")
+        return None
+    return Aim(accuracy, quantity, adaptive)
+
+
+def _solve(
+    states: tuple[Scene, ...], aim: Aim | None, options: Options
+) -> tuple[Solved, PathResult | None, Estimate | AdaptedEstimate | None]:
+    """The scene or its load path, on its own mesh or on meshes refined to an accuracy."""
+    if aim is None:
+        solved = solve_states(states, options=options)
+        return solved, solved.path, None
+    if not aim.adaptive:
+        mesh, estimate = refine(states, aim.quantity, aim.accuracy, options)
         return mesh.solved, mesh.solved.path, estimate
-    solved = solve_states(states, options=options)
-    return solved, solved.path, None
+    if len(states) > 1:
+        raise InputError(f"scene '{states[0].name}' has a load path, which adaptive refinement does not follow.")
+    from contactopt.adaptivity import refine_locally  # it brings the room of derivatives with it
+
+    solved, adapted = refine_locally(states[0], aim.quantity, aim.accuracy, options)
+    return solved, None, adapted
 
 
 def _summary(
-    solved: Solved, method: str, backends: tuple[str, str], path: PathResult | None, estimate: Estimate | None
+    solved: Solved,
+    method: str,
+    backends: tuple[str, str],
+    path: PathResult | None,
+    estimate: Estimate | AdaptedEstimate | None,
 ) -> dict[str, Any]:
     """What is known of the answer but for the seconds: half-widths and pressure are the quantities that accuracy bounds."""
     reduction, solution = solved.reduction, solved.solution

@@ -156,3 +156,18 @@ def test_solutions_on_refined_meshes_are_those_of_the_same_mesh():
     solved, _ = refine_locally(pressed_block(4), "energy", 0.03)
     again = solve(reduce(solved.reduction.scene))
     assert np.allclose(again.reactions, solved.solution.reactions, atol=1e-6 * again.reactions.max())
+
+
+def test_run_takes_it_and_says_what_it_did(tmp_path, capsys):
+    from contactopt import run
+    from contactopt.cli import main
+
+    result = run("cylinder-2d", mu=0.0, accuracy=0.02, quantity="pressure", adaptive=True)
+    assert result.estimate.reached and result.summary["accuracy"]["levels"][-1]["contacts"] == result.problem.contacts
+    line = ["run", "punch-2d", "--accuracy", "0.02", "--quantity", "energy", "--adaptive", "--no-figures"]
+    assert main([*line, "--out", str(tmp_path / "out")]) == 0
+    assert "contacts" in capsys.readouterr().out
+    with pytest.raises(InputError, match="needs an aim"):
+        run("punch-2d", adaptive=True)
+    with pytest.raises(InputError, match="load path"):
+        run("cattaneo-2d", accuracy=0.1, quantity="energy", adaptive=True)

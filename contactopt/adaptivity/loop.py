@@ -40,6 +40,11 @@ class AdaptedLevel:
     error: float
     seconds: float
 
+    @property
+    def mesh(self) -> str:
+        """What the mesh is, in words."""
+        return f"{self.contacts} contacts"
+
 
 @dataclass(frozen=True)
 class AdaptedEstimate:

@@ -65,6 +65,11 @@ class Level:
     uncertainty: float
     seconds: float
 
+    @property
+    def mesh(self) -> str:
+        """What the mesh is, in words."""
+        return f"{self.elements} elements, {self.splits} splits"
+
 
 @dataclass(frozen=True)
 class Estimate:

@@ -58,6 +58,7 @@ def run(options: argparse.Namespace) -> int:
         elements=elements,
         accuracy=options.accuracy,
         quantity=options.quantity,
+        adaptive=options.adaptive,
         figures=tuple(options.figures),
         html=options.html,
         note=lambda text: None if silent else print(f"  {text}", file=sys.stderr, flush=True),
@@ -105,10 +106,7 @@ def _print_estimate(estimate: Any) -> None:
     print(f"{estimate.quantity} {estimate.value:.6g}, estimated relative error {error}, asked for {estimate.target:g}:")
     print(f"  {estimate.message}")
     for level in estimate.levels:
-        print(
-            f"  {level.elements} elements, {level.splits} splits: {level.unknowns} unknowns, "
-            f"{level.value:.6g}, {level.seconds:.2f} s"
-        )
+        print(f"  {level.mesh}: {level.unknowns} unknowns, {level.value:.6g}, {level.seconds:.2f} s")
 
 
 def view(options: argparse.Namespace) -> int:
