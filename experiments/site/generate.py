@@ -28,6 +28,7 @@ TUTORIALS = (
     "a_load_cycle",
     "beat_our_solvers",
     "reading_a_strangers_problem",
+    "derivatives_with_kinks",
 )
 # reports about accuracy; all others are about performance
 ACCURACY = (
