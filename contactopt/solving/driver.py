@@ -246,6 +246,7 @@ class _Recorder:
                 return residual
         return natural_map_residual(self.problem, self.reactions, self.multipliers)
 
+    @np.errstate(all="ignore")  # numbers beyond the range of floats have no certificate
     def record(self, iterate: Iterate | Known, counts: dict[str, float]) -> Status | None:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
         r, lam, *known = iterate
