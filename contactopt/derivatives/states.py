@@ -90,7 +90,7 @@ class Step:
     @cached_property
     def displaced(self) -> tuple[np.ndarray, ...]:
         """U (n,) of every body."""
-        return self.reduction.displaced(self.solution.reactions, self.solution.multipliers)
+        return self.reduction.displaced(self.solution)
 
     @cached_property
     def forces(self) -> tuple[np.ndarray, ...]:

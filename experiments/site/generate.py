@@ -122,7 +122,7 @@ def command_line() -> str:
     commands = next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction)).choices
     pages = [f"# Command line\n\n{inspect.getdoc(contactopt.cli)}\n"]
     for name, command in commands.items():
-        command.formatter_class = partial(argparse.HelpFormatter, width=100)
+        command.formatter_class = partial(command.formatter_class, width=100)
         pages.append(f"## contactopt {name}\n\n```text\n{command.format_help()}```\n")
     return "\n".join(pages)
 
