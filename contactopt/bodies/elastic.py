@@ -28,7 +28,7 @@ from contactopt.bodies.body import Assembly, build_body, reload_body
 from contactopt.bodies.fields import Fields, fields_of, recovery_error
 from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
 from contactopt.bodies.solvers import make_solver, solver_type
-from contactopt.bodies.solvers.system import BodySolver, System
+from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.errors import InputError
 from contactopt.problem.operators import Product
 from contactopt.scenes.scene import Part, Scene
@@ -314,7 +314,8 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     kept = np.setdiff1d(body.free, body.rigid_motions.fixing)
     place[kept] = np.arange(len(kept))
     interface = np.intersect1d(body.contact_dofs, kept)
-    A = body.A[kept][:, kept]
+    iterative = solver_type(solver, len(kept), len(dofs)).iterative
+    A = Block(body.A, kept) if iterative else body.A[kept][:, kept]
     trailing = place[interface] if entries else None
     made = make_solver(solver, System(A, node[kept], component[kept], body.locations, trailing))
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)

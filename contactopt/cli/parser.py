@@ -6,6 +6,7 @@ import argparse
 
 import contactopt
 from contactopt.analysis.quantities import QUANTITIES
+from contactopt.benchmark.keys import help_text
 from contactopt.bodies.solvers import SOLVERS
 from contactopt.cli import commands
 from contactopt.figures.style import FORMATS
@@ -103,7 +104,9 @@ def _run(run: argparse.ArgumentParser) -> None:
 
 
 def _bench(bench: argparse.ArgumentParser) -> None:
-    bench.add_argument("file", metavar="FILE", help="experiment, TOML (see contactopt.benchmark)")
+    bench.formatter_class = argparse.RawDescriptionHelpFormatter
+    bench.epilog = help_text()
+    bench.add_argument("file", metavar="FILE", help="experiment, a TOML file whose keys are listed below")
     bench.add_argument("--out", metavar="DIR", help="where results go (default: out/bench/NAME)")
     bench.add_argument("--jobs", type=int, metavar="N", help="worker processes (one per core)")
     bench.add_argument("--resume", action="store_true", help="go on with an interrupted campaign")
