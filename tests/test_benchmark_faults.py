@@ -625,3 +625,22 @@ def test_rows_that_were_not_asked_for_or_are_missing_are_told(tmp_path, monkeypa
         benchmark.run_campaign(path, tmp_path / "b", jobs=1, quiet=True)
     monkeypatch.undo()
     assert len(benchmark.load(benchmark.run_campaign(path, tmp_path / "a", resume=True, quiet=True))) == 12
+
+
+def test_a_plug_in_counts_for_the_registry_that_runs_its_file(tmp_path):
+    """Nothing is left in the module: not by a second registry, and not by a file that is imported in a plain way."""
+    from contactopt.benchmark.plugins import Registry
+
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "from contactopt.benchmark import method, problem\n@method(law='associated')\ndef mine(p): return p.q\n"
+        "@problem(name='other')\ndef family(n=1): return n\n"
+    )
+    first, second = Registry(), Registry()
+    first.load([file, file])
+    mine = first.find("mine")
+    assert mine is not None and mine.law == "associated" and first.problems["other"]() == 1
+    assert second.find("mine") is None and not second.problems
+    names = {}
+    exec(compile(file.read_text(), file, "exec"), names)
+    assert callable(names["mine"]) and second.find("mine") is None and list(first.methods) == ["mine"]

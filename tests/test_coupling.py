@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 import turned
 from conftest import MATERIAL, block, two_blocks
 
-from contactopt import InputError, Part, Rigid, Scene, Support, reduce, reduce_bodies, scenes, solve
+from contactopt import InputError, InterfaceProblem, Part, Rigid, Scene, Support, reduce, reduce_bodies, scenes, solve
 from contactopt.analysis.paths import follow
 from contactopt.analysis.quantities import elastic_energy
 from contactopt.bodies import BODIES
@@ -230,7 +231,7 @@ def test_a_kind_of_body_is_added_by_one_line(monkeypatch, form):
     block_alone = 3.0 * (1 - 0.3**2) / 5
     assert -solution.multipliers[0] == pytest.approx(block_alone + 3.0 / 2.0, rel=1e-8)
     assert elastic_energy(reduction, solution) == pytest.approx(3.0 * block_alone / 2 + 9.0 / (2 * 2.0), rel=1e-8)
-    u = sum(B @ U for B, U in zip(reduction.maps, reduction.displaced(solution.reactions, solution.multipliers)))
+    u = sum(B @ U for B, U in zip(reduction.maps, reduction.displaced(solution)))
     expected = reduction.problem.displacements(solution.reactions, solution.multipliers).ravel()
     assert np.allclose(u, expected, atol=1e-9)
 
@@ -265,6 +266,9 @@ def test_a_large_array_is_announced_and_a_huge_one_refused(monkeypatch, caplog):
     with pytest.raises(InputError, match="would take 800 bytes, more than 799; take Q = 'implicit'"):
         reduce(scene, Q="explicit")
     assert reduce(scene, Q="implicit").contacts == 5
+    rows = sp.csr_array(np.eye(10))
+    with pytest.raises(InputError, match="would take 800 bytes, more than 799"):  # the same limit for sparse rows
+        InterfaceProblem(rows, np.zeros((5, 2)), 0.3).explicit()
 
 
 def test_meshes_keep_their_own_mapping():

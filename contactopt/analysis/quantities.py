@@ -31,7 +31,7 @@ def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
 
 def elastic_energy(reduction: Reduction, solution: Solution) -> float:
     """Elastic energy of all bodies together, the sum of U' A U / 2 [force length]."""
-    displaced = reduction.displaced(solution.reactions, solution.multipliers)
+    displaced = reduction.displaced(solution)
     return sum(body.energy(U) for body, U in zip(reduction.bodies, displaced))
 
 
@@ -105,7 +105,7 @@ def _one_pair(reduction: Reduction) -> None:
     if len(reduction.problem.pairs) > 1:
         raise InputError(
             f"scene '{reduction.scene.name}' has {len(reduction.problem.pairs)} pairs of surfaces, each with its own pressure and "
-            "half-widths; ask for the energy, or read them by pair (contactopt.analysis.resultants)."
+            "half-widths; name the pair, as in 'pressure:" + reduction.problem.pairs[0].name + "', or ask for the energy."
         )
 
 
@@ -136,3 +136,4 @@ QUANTITIES: dict[str, Callable[[Reduction, Solution], float]] = {
     "stick": lambda *solved: stick_ratio(*solved)[0],
     "energy": elastic_energy,
 }
+OF_ONE_PAIR = ("pressure", "width", "stick")  # these belong to a surface, not to the scene as a whole

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.concurrency import each
 from contactopt.bodies.protocol import Body, Equilibrium
 from contactopt.problem.coupled import Act, CoupledForm
 
@@ -36,8 +35,10 @@ def coupled_form(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> Coupl
     L, R = np.concatenate(left, axis=1), np.concatenate(right, axis=1)
 
     def all_bodies(acts: Sequence[Act]) -> Act:
+        """One body after the other: threads share the products of each, so that a small body never waits for a large one."""
+
         def act(X: np.ndarray) -> np.ndarray:
-            return np.concatenate(each(lambda pair: pair[0](pair[1]), zip(acts, np.split(X, ends))))
+            return np.concatenate([own(x) for own, x in zip(acts, np.split(X, ends))])
 
         return act
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contactopt.bodies.concurrency import each
 from contactopt.bodies.fields import Fields
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution
@@ -11,6 +12,6 @@ __all__ = ["Fields", "recover"]
 
 def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:
     """Displacement and stress of the elastic bodies of a solved scene, upper body first."""
-    displaced = zip(reduction.bodies, reduction.displaced(solution.reactions, solution.multipliers))
-    fields = (body.fields(U) for body, U in displaced)
+    displaced = zip(reduction.bodies, reduction.displaced(solution))
+    fields = each(lambda pair: pair[0].fields(pair[1]), displaced)
     return tuple(found for found in fields if found is not None)

@@ -17,6 +17,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from types import FunctionType
 from typing import Any
@@ -27,17 +28,20 @@ import scipy.sparse as sp
 from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
 from contactopt.bodies.protocol import AssembledBody, Body
+from contactopt.bodies.solvers import factors_of
+from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
 from contactopt.interface.coupling import Coupling, couple
 from contactopt.interface.equilibrium import coupled_form
-from contactopt.problem import InterfaceProblem, Law, Pair
+from contactopt.problem import InterfaceProblem, Law, Pair, Solution
 from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
 from contactopt.problem.operators import (
     FORMS,
+    Interface,
     InterfaceOperator,
     Product,
     check_dense,
@@ -45,6 +49,7 @@ from contactopt.problem.operators import (
     estimate_diagonal,
     nodal_weights,
 )
+from contactopt.problem.threads import one_blas_thread
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import MOST_ACROSS, Part, Scene
 
@@ -68,6 +73,21 @@ class Reduction:
     maps: tuple[sp.csr_matrix, ...]
     couplings: tuple[Coupling, ...]
     seconds: dict[str, float]
+
+    def __repr__(self) -> str:
+        unknowns, pairs = (
+            count(self.dofs, "unknown"),
+            count(len(self.couplings), "pair of surfaces", "pairs of surfaces"),
+        )
+        return line("Reduction", self.scene.name, unknowns, count(self.problem.contacts, "contact"), pairs)
+
+    def _repr_html_(self) -> str:
+        rows: dict[str, object] = {"scene": self.scene.name, "kind": self.scene.kind}
+        for body in self.bodies:
+            rows[f"body {body.name}"] = count(body.unknowns, "unknown")
+        for pair, coupling in zip(self.problem.pairs, self.couplings):
+            rows[f"surfaces {pair.name}"] = f"{count(len(coupling.gap), 'contact')}, coupled by {coupling.kind}"
+        return card("Reduction", rows)
 
     @property
     def coupling(self) -> Coupling:
@@ -108,10 +128,27 @@ class Reduction:
         ends = np.cumsum([len(body.resultants) for body in self.bodies])
         return tuple(np.split(multipliers, ends[:-1]))
 
-    def displaced(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, ...]:
-        """The displacements U (n,) of every body under reactions (k, dim) and multipliers (p,)."""
-        parts = zip(self.bodies, self.maps, self.own_multipliers(multipliers))
-        return tuple(body.displacement(B.T @ reactions.ravel(), own) for body, B, own in parts)
+    def displaced(self, solution: Solution) -> tuple[np.ndarray, ...]:
+        """The displacements U (n,) of every body of a solution.
+
+        Bodies whose displacements came with the contact forces are not solved again.
+        """
+        known = solution.displacements
+        systems = [None if known is None else body.equilibrium for body in self.bodies]
+        ends = np.cumsum([0 if system is None else len(system.free) for system in systems])
+        found = []
+        for body, B, own, system, end in zip(
+            self.bodies, self.maps, self.own_multipliers(solution.multipliers), systems, ends
+        ):
+            force = B.T @ solution.reactions.ravel()
+            if system is None or known is None:
+                found.append(body.displacement(force, own))
+                continue
+            left, right = system.low_rank
+            U = body.at_rest + body.motions @ own + left @ (right.T @ force)
+            U[system.free] += known[end - len(system.free) : end]
+            found.append(U)
+        return tuple(found)
 
     def loaded(self, scene: Scene) -> Reduction:
         """The same bodies, coupling and Q under the loads of another scene of the same structure.
@@ -122,9 +159,7 @@ class Reduction:
         _check_same(self.scene, scene)
         start = time.perf_counter()
         bodies = tuple(old.loaded(scene, part) for old, part in zip(self.bodies, scene.parts))
-        q, V, s = _linear_terms(bodies, self.maps, self.couplings)
-        law = _law(scene.pairs, self.couplings)
-        problem = replace(self.problem, q=q, V=V, s=s, law=law, motions=_names(bodies))
+        problem = _problem(scene, self.problem.Q, bodies, self.maps, self.couplings)
         seconds = {"load": time.perf_counter() - start}
         return replace(self, scene=scene, problem=problem, bodies=bodies, seconds=seconds)
 
@@ -243,7 +278,7 @@ def reduce_bodies(
         check_number("the contact zone's half-width", zone, low=0.0)
     seconds: dict[str, float] = {}
     start = time.perf_counter()
-    assembled = [assemble(scene, part, elements, zone) for part in scene.parts]
+    assembled = each(lambda part: assemble(scene, part, elements, zone), scene.parts)
     named = {body.name: body for body in assembled}
     sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
     coupled = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in zip(scene.pairs, sides))
@@ -256,22 +291,20 @@ def reduce_bodies(
         contact, largest = (max(getattr(b, size) for b in assembled) for size in ("interface_unknowns", "unknowns"))
         if _filling(maps) ** 0.5 > MOST_EXPLICIT:
             contact = MOST_EXPLICIT + 1
-        Q = form_of(contact, largest, scene.dim, any(b.iterates(solver) for b in assembled))
+        Q = form_of(
+            contact, largest, scene.dim, any(b.iterates(solver) for b in assembled), factors_of(solver, scene.dim)
+        )
     log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, n)
     if Q == "explicit":
         check_dense(round(_filling(maps) ** 0.5))
-    bodies = each(lambda body: body.prepare(solver, Q == "explicit"), assembled)
+    iterate = any(body.iterates(solver) for body in assembled)
+    with one_blas_thread() if iterate else nullcontext():
+        bodies = each(lambda body: body.prepare(solver, Q == "explicit"), assembled)
     seconds["factorise"] = time.perf_counter() - start
 
     start = time.perf_counter()
-    q, V, s = _linear_terms(bodies, maps, coupled)
     made = _operator(bodies, maps, coupled) if Q == "implicit" else _entries(bodies, maps)
-    areas = np.concatenate([part.areas for part in coupled])
-    points = np.concatenate([part.positions for part in coupled], axis=1)
-    pairs = _pairs(scene, coupled)
-    chart = pairs[0].chart if len(pairs) == 1 else None
-    law, names = _law(scene.pairs, coupled), _names(bodies)
-    problem = InterfaceProblem(made, q, law, V, s, areas, points, chart, pairs, names)
+    problem = _problem(scene, made, bodies, maps, coupled)
     seconds["compliance"] = time.perf_counter() - start
     return Reduction(scene, problem, bodies, maps, coupled, seconds)
 
@@ -280,15 +313,18 @@ def _map_of(
     body: AssembledBody, sides: Sequence[tuple[AssembledBody, AssembledBody]], couplings: Sequence[Coupling]
 ) -> sp.csr_matrix:
     """B (k dim, n) of a body: the maps of the pairs that it takes part in, with their signs, and zeros elsewhere."""
-    blocks: list[sp.csr_matrix | int] = []
-    width = 0
-    for (upper, lower), made in zip(sides, couplings):
-        rows = made.frames.shape[0] * made.frames.shape[1]
-        own = made.upper if body is upper else -made.lower if body is lower else None
-        blocks.append(rows if own is None else own)
-        width = width if own is None else own.shape[1]
-    filled = [sp.csr_matrix((block, width)) if isinstance(block, int) else block for block in blocks]
-    return filled[0] if len(filled) == 1 else sp.csr_matrix(sp.vstack(filled, format="csr"))
+    ends = np.cumsum([0, *(made.frames.shape[0] * made.frames.shape[1] for made in couplings)])
+    blocks = [
+        (first, made.upper if body is upper else -made.lower)
+        for first, (upper, lower), made in zip(ends, sides, couplings)
+        if body is upper or body is lower
+    ]
+    width = blocks[0][1].shape[1]
+    entries = [(first, sp.coo_matrix(block)) for first, block in blocks]
+    rows = np.concatenate([first + block.row for first, block in entries])
+    columns = np.concatenate([block.col for _, block in entries])
+    values = np.concatenate([block.data for _, block in entries])
+    return sp.csr_matrix((values, (rows, columns)), (int(ends[-1]), width))
 
 
 def _pairs(scene: Scene, couplings: Sequence[Coupling]) -> tuple[Pair, ...]:
@@ -324,6 +360,10 @@ def _operator(
     kernels = [body.convolution(B) for body, B in zip(bodies, maps) if body.moved(B).any()]
     if kernels and all(kernel is not None for kernel in kernels):
         known = [kernel for kernel in kernels if kernel is not None]
+        if len({kernel.padded for kernel in known}) > 1:
+            raise InputError(
+                "one half-space repeats itself periodically and the other does not; make both periodic or none."
+            )
         return Convolution(sum(known[1:], known[0]))
     moved = [body.moved(B) for body, B in zip(bodies, maps)]
     moving = [(body, B, _rows(B)) for body, B, moves in zip(bodies, maps, moved) if moves.any()]
@@ -359,30 +399,33 @@ def _filling(maps: Sequence[sp.csr_matrix]) -> int:
 def _entries(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarray | sp.csr_array:
     """Q by its entries, symmetric to the last digit: an array, or sparse rows where most pairs share no body."""
     n = maps[0].shape[0]
-    thin = _filling(maps) < SPARSE * n**2
-    Q = sp.csr_array((n, n)) if thin else np.zeros((n, n))
-    for body, B in zip(bodies, maps):
-        if not body.moved(B).any():
-            continue
-        rows = _rows(B)
-        if thin:
-            place = np.repeat(rows, len(rows)), np.tile(rows, len(rows))
-            Q = Q + sp.csr_array((body.compliance(B[rows]).ravel(), place), (n, n))
-        elif len(rows) == n:
-            Q += body.compliance(B)
+    parts = [(_rows(B), body.compliance(B[_rows(B)])) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    if _filling(maps) < SPARSE * n**2:
+        rows = np.concatenate([np.repeat(rows, len(rows)) for rows, _ in parts])
+        columns = np.concatenate([np.tile(rows, len(rows)) for rows, _ in parts])
+        return sp.csr_array((np.concatenate([own.ravel() for _, own in parts]), (rows, columns)), (n, n))
+    Q = np.zeros((n, n))
+    for rows, own in parts:
+        if len(rows) == n:
+            Q += own
         else:
-            Q[np.ix_(rows, rows)] += body.compliance(B[rows])
+            Q[np.ix_(rows, rows)] += own
     return Q
 
 
-def _linear_terms(
-    bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q (k, dim), V (k dim, p) and s (p,)."""
+def _problem(
+    scene: Scene, Q: Interface, bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
+) -> InterfaceProblem:
+    """The interface problem of a scene whose bodies and couplings are made and whose Q is known."""
     gap = np.concatenate([made.gap for made in couplings])
     q = np.zeros((len(gap), maps[0].shape[0] // max(len(gap), 1)))
     q[:, 0] = gap
     for body, B in zip(bodies, maps):
         q += (B @ body.at_rest).reshape(q.shape)
     V = np.concatenate([B @ body.motions for body, B in zip(bodies, maps)], axis=1)
-    return q, V, np.concatenate([body.resultants for body in bodies])
+    s = np.concatenate([body.resultants for body in bodies])
+    areas = np.concatenate([made.areas for made in couplings])
+    points = np.concatenate([made.positions for made in couplings], axis=1)
+    pairs = _pairs(scene, couplings)
+    chart = pairs[0].chart if len(pairs) == 1 else None
+    return InterfaceProblem(Q, q, _law(scene.pairs, couplings), V, s, areas, points, chart, pairs, _names(bodies))

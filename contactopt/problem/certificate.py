@@ -58,10 +58,12 @@ class Moved:
 
     value     (k dim,) [length]
     accuracy  error of these displacements in the energy norm, relative to them: how far the bodies are from equilibrium
+    displacements  (N,) these displacements, the unknowns X of contactopt.problem.coupled [length]
     """
 
     value: np.ndarray
     accuracy: float
+    displacements: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

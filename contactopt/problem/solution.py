@@ -7,6 +7,7 @@ from enum import Enum
 
 import numpy as np
 
+from contactopt.cards import card, count, line
 from contactopt.problem.feasibility import Infeasible
 
 
@@ -44,6 +45,8 @@ class Solution:
                  phase of their own names it: recovery, the coarse meshes before this one, the phases of a reduction
     notes        sentences about what the solve did otherwise than expected: a fallback, a stage that failed
     proof        status `infeasible`: the ray that proves that there is no solution
+    displacements  (N,) of the bodies that are solved by iteration, from methods that work on them (the unknowns X of
+                 contactopt.problem.coupled) [length]; None from all others
     """
 
     reactions: np.ndarray
@@ -57,6 +60,7 @@ class Solution:
     message: str = ""
     notes: tuple[str, ...] = ()
     proof: Infeasible | None = None
+    displacements: np.ndarray | None = None
 
     @property
     def products(self) -> int:
@@ -66,3 +70,19 @@ class Solution:
     @property
     def solved(self) -> bool:
         return self.status is Status.SOLVED
+
+    def __repr__(self) -> str:
+        contacts = count(len(self.reactions), "contact")
+        steps = count(self.iterations, "iteration")
+        return line("Solution", self.status.label, f"residual {self.residual:.1e}", steps, self.method, contacts)
+
+    def _repr_html_(self) -> str:
+        rows = {
+            "status": f"{self.status.label}: {self.message or self.status.sentence}",
+            "residual (certificate)": f"{self.residual:.2e}",
+            "iterations": self.iterations,
+            "method": self.method,
+            "contacts": len(self.reactions),
+            "time": f"{sum(self.seconds.values()):.3g} s",
+        }
+        return card("Solution", rows | {f"note {n}": note for n, note in enumerate(self.notes, 1)})

@@ -155,6 +155,7 @@ def _run(
         {"solve": recorder.clock, "certificate": recorder.certified},
         message or status.sentence,
         proof=proof,
+        displacements=recorder.displacements,
     )
 
 
@@ -217,6 +218,7 @@ class _Recorder:
         self.problem, self.scales, self.tol, self.change_tol = problem, scales, tol, change_tol
         self.max_iterations, self.time_limit, self.progress = max_iterations, time_limit, progress
         self.reactions, self.multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
+        self.displacements: np.ndarray | None = None
         self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
         self.history: list[dict[str, float]] = []
         self.previous = self.reactions
@@ -231,8 +233,12 @@ class _Recorder:
         Where products cost iterations it is computed to a digit as long as it is far from the tolerance.
         """
         if known:
-            moved = replace(known[0], value=known[0].value * self.scales.length)
+            length = self.scales.length
+            moved = replace(known[0], value=known[0].value * length)
+            X = known[0].displacements
+            self.displacements = None if X is None else X * length
             return natural_map_residual(self.problem, self.reactions, self.multipliers, moved=moved)
+        self.displacements = None
         rough = loosened(self.problem.Q, ROUGH)
         if rough is not self.problem.Q:
             residual = natural_map_residual(replace(self.problem, Q=rough), self.reactions, self.multipliers)

@@ -242,7 +242,7 @@ def report(results: list[tuple[str, str, str]]) -> None:
         forces=FORCES,
         lies=listed,
         units=UNITS_OF,
-        scales=", ".join(f"({f:g}, {l:g})" for f, l in SCALES),
+        scales=", ".join(f"({f:g}, {length:g})" for f, length in SCALES),
     )
     write("search_for_lies", "A search for lies", text.replace("TABLE", "{table}"), {"table": rows}, {})
 

@@ -50,8 +50,6 @@ from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equatio
 from contactopt.solving.kernels.interior import Path, interior_iterates
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.solving.methods import NATIVE, Iterate, Known
-from contactopt.solving.methods.cone import AcaryCadoux
-from contactopt.solving.methods.nested import Nested
 from contactopt.solving.methods.newton import Newton
 from contactopt.solving.methods.proximal import Proximal, proximal_equations, proximal_iterates
 from contactopt.solving.notes import note
@@ -90,6 +88,8 @@ class Auto:
             except InputError as error:
                 note(logger, f"the default method ends with Newton's steps: {error}")
                 return
+        from contactopt.solving.methods.cone import AcaryCadoux
+
         matrix = block_matrix(problem.Q, problem.dim)
         if start is not None and sp.issparse(problem.Q):
             reached = yield from self._proximal(problem, matrix, start, POLISH, LEAST_ALPHA)
@@ -115,6 +115,8 @@ class Auto:
     @staticmethod
     def _jammed(problem: InterfaceProblem, matrix: Blocks, reached: Iterate) -> Generator[Iterate, None, None]:
         """Without end: interior-point paths drawn at random, and the gentle proximal loop from the best point so far."""
+        from contactopt.solving.methods.cone import AcaryCadoux
+
         random, evaluate = np.random.default_rng(0), proximal_equations(problem, matrix).evaluate
         interior = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         for restarts in count():
@@ -129,6 +131,8 @@ class Auto:
     @staticmethod
     def _nested(problem: InterfaceProblem, start: Iterate | None) -> Generator[Iterate, None, Iterate | None]:
         """Iterates of the nested method while they change for the better; returns the best."""
+        from contactopt.solving.methods.nested import Nested
+
         best, reached, since = np.inf, start, 0
         for point, residual in Nested().steps(problem, start):
             yield point
@@ -159,6 +163,8 @@ class Auto:
     @staticmethod
     def _cones(problem: InterfaceProblem, start: Iterate) -> Generator[Iterate, None, Iterate]:
         """A few cone programs; returns the best point, `start` if there was none better."""
+        from contactopt.solving.methods.cone import AcaryCadoux
+
         if not AcaryCadoux().solves(problem.law):
             return start
         equations = coulomb_equations(problem)
