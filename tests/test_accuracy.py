@@ -284,7 +284,9 @@ def test_a_quantity_of_one_of_several_pairs():
     block = Part("block", mesh, Material(5.0, 0.3), (Support("axis", {"x": 0.0}),), (plate,))
     names = round_one.upper.name, round_one.lower.name
     pairs = Contact(*names, 0.0), Contact("block", "floor", 0.3)
-    scene = replace(round_one, upper=None, lower=None, mu=None, bodies=(*round_one.parts, block, Rigid("floor")), contacts=pairs)
+    scene = replace(
+        round_one, upper=None, lower=None, mu=None, bodies=(*round_one.parts, block, Rigid("floor")), contacts=pairs
+    )
     result = run(scene, accuracy=0.1, quantity="pressure:" + "-".join(names), figures=())
     assert result.estimate.reached
     assert result.estimate.value == pytest.approx(round_one.reference.peak, rel=0.02)

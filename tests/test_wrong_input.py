@@ -25,7 +25,7 @@ def sound(path):
 
 def test_a_file_that_never_ends_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe.hdf5")
-    with pytest.raises(InputError, match="pipe.hdf5"):
+    with pytest.raises(InputError, match=r"pipe\.hdf5"):
         fclib.read(tmp_path / "pipe.hdf5")
 
 

@@ -147,7 +147,9 @@ def refine(
     if name not in QUANTITIES:
         raise InputError(f"unknown quantity {quantity!r}; choose from {', '.join(QUANTITIES)}.")
     if pair and pair not in (known := [made.name for made in states[0].pairs]):
-        raise InputError(f"quantity {quantity!r}: there is no pair of surfaces {pair!r}; the pairs are {', '.join(known)}.")
+        raise InputError(
+            f"quantity {quantity!r}: there is no pair of surfaces {pair!r}; the pairs are {', '.join(known)}."
+        )
     if pair and name not in OF_ONE_PAIR:
         raise InputError(f"the {name} belongs to the whole scene; of one pair ask for {', '.join(OF_ONE_PAIR)}.")
     check_number("the accuracy", accuracy, low=0.0, high=1.0)

@@ -105,7 +105,9 @@ def _one_pair(reduction: Reduction) -> None:
     if len(reduction.problem.pairs) > 1:
         raise InputError(
             f"scene '{reduction.scene.name}' has {len(reduction.problem.pairs)} pairs of surfaces, each with its own pressure and "
-            "half-widths; name the pair, as in 'pressure:" + reduction.problem.pairs[0].name + "', or ask for the energy."
+            "half-widths; name the pair, as in 'pressure:"
+            + reduction.problem.pairs[0].name
+            + "', or ask for the energy."
         )
 
 

@@ -29,6 +29,8 @@ import skfem
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine, RefQuad, RefTri
 
+from contactopt.errors import InputError
+
 SHAPES = {
     "RefTri": (skfem.MeshTri, {1: skfem.ElementTriP1, 2: skfem.ElementTriP2}),
     "RefQuad": (skfem.MeshQuad, {1: skfem.ElementQuad1, 2: skfem.ElementQuad2}),
@@ -106,7 +108,7 @@ class LeanBasis(skfem.CellBasis):
         with np.errstate(all="ignore"):
             try:
                 ratio = np.broadcast_to(self.mapping.detDF(self.X), (self.nelems, len(self.W)))
-                bad = ~(ratio.min(axis=1) * ratio.max(axis=1) > 0)
+                bad = ~((ratio.min(axis=1) > 0) | (ratio.max(axis=1) < 0))
             except Exception as error:  # scikit-fem has no name for it
                 raise InputError(f"the mesh has an element without volume, or one that folds over: {error}.") from error
         if np.any(bad):

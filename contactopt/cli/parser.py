@@ -87,7 +87,11 @@ def _run(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--accuracy", type=float, metavar="X", help="refine until the quantity's relative error is below X"
     )
-    run.add_argument("--quantity", metavar="NAME", help="what --accuracy bounds: " + ", ".join(QUANTITIES) + "; of one pair NAME:PAIR")
+    run.add_argument(
+        "--quantity",
+        metavar="NAME",
+        help="what --accuracy bounds: " + ", ".join(QUANTITIES) + "; of one pair NAME:PAIR",
+    )
     run.add_argument("--adaptive", action="store_true", help="refine only where the quantity needs it")
     run.add_argument("--tol", type=float, metavar="T", help="bound on the natural-map residual (1e-8)")
     pictures = run.add_mutually_exclusive_group()
