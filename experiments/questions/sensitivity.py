@@ -331,7 +331,9 @@ units of N and mm:
 What it costs, in CPU seconds, medians on a shared machine, `OMP_NUM_THREADS=1`. The gradient by all data (q, mu, s, Q, V) of one function is one
 factorisation with one solve, or one coupled linear solve to the relative accuracy 1e-11, and the certificate of the solution. The whole
 solve shares one factorisation among its steps (dense), and solves its linear systems to one or two digits only (multigrid), so that
-the average step is much cheaper than a step that stands alone:
+the average step is much cheaper than a step that stands alone. The aim was one dense step that factorises, and it is missed: about half of
+the time of the gradient is spent around the factorisation, on the dimensionless copy of Q, the check of the certificate and the bonded
+system's own check of symmetry:
 
 {{costs}}
 
