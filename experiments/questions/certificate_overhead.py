@@ -9,6 +9,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import time  # noqa: E402
 from collections.abc import Callable  # noqa: E402
+from functools import partial  # noqa: E402
 from itertools import islice  # noqa: E402
 from typing import Any  # noqa: E402
 
@@ -46,11 +47,9 @@ def row(name: str) -> dict[str, object]:
         made, checks = clocked(
             lambda: InterfaceProblem(problem.Q, problem.q, problem.law, problem.V, problem.s, problem.areas)
         )
-        solution, whole = clocked(lambda: solve(made))
-        certificate = sum(
-            clocked(lambda: natural_map_residual(problem, solution.reactions, solution.multipliers))[1]
-            for _ in range(solution.iterations)
-        )
+        solution, whole = clocked(partial(solve, made))
+        certify = partial(natural_map_residual, problem, solution.reactions, solution.multipliers)
+        certificate = sum(clocked(certify)[1] for _ in range(solution.iterations))
         runs.append((checks, whole, alone(problem, solution.iterations), certificate))
     checks, whole, method, certificate = np.median(runs, axis=0)
     extra = max(checks + whole - method, 0.0)
