@@ -25,7 +25,7 @@ from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.coupled import CoupledForm
 from contactopt.problem.operators import InterfaceOperator
-from contactopt.solving.kernels.alart_curnier import LOOSE
+from contactopt.solving.constants import LOOSE
 from contactopt.solving.kernels.bonded import Bonded
 from contactopt.solving.kernels.coupled import fitted
 from contactopt.solving.kernels.flexible import flexible_gmres
