@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from contactopt.analysis.quantities import QUANTITIES
+from contactopt.bodies.ranks import Team, launch, leave, serve, world
 from contactopt.bodies.solvers import SOLVERS
 from contactopt.errors import InputError
 from contactopt.problem.laws import LAWS
@@ -26,9 +27,25 @@ FORCES = {("mm", "MPa"): "N", ("m", "Pa"): "N", ("m", "kPa"): "kN", ("m", "MPa")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code: 0 solved, 1 not solved, 2 bad input."""
-    options = make_parser().parse_args(arguments)
+    told = sys.argv[1:] if arguments is None else list(arguments)
+    options = make_parser().parse_args(told)
+    if (comm := world()) is None:
+        ranks = getattr(options, "ranks", None)
+        return _answered(lambda: options.command(options) if ranks is None else launch(ranks, told))
+    if comm.rank:
+        serve(comm)
+        return 0
+    team = Team(comm)
     try:
-        return int(options.command(options))
+        return leave(_answered(lambda: _on_ranks(options, team)))
+    finally:
+        team.dismiss()
+
+
+def _answered(command: Callable[[], int]) -> int:
+    """The exit code of a command; what ends it is said in one sentence."""
+    try:
+        return command()
     except InputError as error:
         print(f"contactopt: {error}", file=sys.stderr)
         return 2
@@ -66,6 +83,7 @@ def make_parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--quantity", metavar="NAME", help="what --accuracy bounds: " + ", ".join(QUANTITIES))
     run.add_argument("--tol", type=float, metavar="T", help="bound on the natural-map residual (1e-8)")
+    run.add_argument("--ranks", type=int, metavar="N", help="processes among which the bodies are dealt out (needs mpi4py)")
     new = commands.add_parser("new", help="write a scene file to start from, an example that runs")
     new.set_defaults(command=_new)
     new.add_argument("file", metavar="FILE", help="name of the file, ends in .toml; an existing one is not overwritten")
@@ -93,7 +111,18 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _run(options: argparse.Namespace) -> int:
+def _on_ranks(options: argparse.Namespace, team: Team) -> int:
+    """`run` on rank 0 with the bodies dealt out to all ranks."""
+    if options.command is not _run:
+        raise InputError("only the command 'run' uses several ranks; start the others without mpiexec.")
+    if options.ranks not in (None, team.size):
+        raise InputError(f"--ranks {options.ranks} was asked for, but mpiexec started {team.size} ranks.")
+    code = _run(options, team)
+    print(f"{team.size} ranks, {team.traffic.messages} messages, {team.traffic.bytes} bytes")
+    return code
+
+
+def _run(options: argparse.Namespace, team: Team | None = None) -> int:
     from contactopt.runner import run
 
     out = options.out or f"out/{Path(options.scene).stem}"
@@ -116,6 +145,7 @@ def _run(options: argparse.Namespace) -> int:
         accuracy=options.accuracy,
         quantity=options.quantity,
         note=lambda text: print(f"  {text}", file=sys.stderr, flush=True),
+        team=team,
         **changes,
     )
     s = result.summary

@@ -19,6 +19,7 @@ from contactopt.analysis.resultants import tables
 from contactopt.analysis.solve_scene import Options, Solved
 from contactopt.analysis.surfaces import contact_fields, on_nodes
 from contactopt.analysis.zone import solve_zone
+from contactopt.bodies.ranks import Team, spread
 from contactopt.errors import InputError
 from contactopt.files import check_folder, whole_folder
 from contactopt.interface.recovery import Fields, recover
@@ -88,6 +89,7 @@ def run(
     accuracy: float | None = None,
     quantity: str | None = None,
     note: Note = lambda text: None,
+    team: Team | None = None,
     **changes: Any,
 ) -> Result:
     """Solve a scene end to end, and write its figures and files into a folder if one is given.
@@ -108,6 +110,7 @@ def run(
     quantity : a name in contactopt.analysis.quantities.QUANTITIES
         All arguments from `method` to here may stand in a scene file; those given here win.
     note : receives progress messages
+    team : ranks among which the bodies are dealt out (contactopt.bodies.ranks); None: all bodies live in this process
     changes : to the arguments of a named scene, or to the fields of a Scene
 
     Returns
@@ -135,6 +138,8 @@ def run(
     backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
     form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
     options = Options(form, choose("solver", solver, "auto"), chosen, choose("tol", tol, 1e-8), note=note)
+    if team is not None:
+        states = tuple(spread(state, team) for state in states)
     try:
         return _finish(states, out, method, backends, options, accuracy, quantity, start)
     except InputError as error:

@@ -22,6 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.body import Assembly, build_body, reload_body
+from contactopt.bodies.elements import face_nodes
 from contactopt.bodies.fields import Fields, fields_of
 from contactopt.bodies.protocol import Equilibrium, Mesh, Product, Surface
 from contactopt.bodies.solvers import make_solver, solver_type
@@ -217,7 +218,8 @@ class AssembledElastic:
             places = np.asarray(curve(places), dtype=float)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False
-        facets = np.asarray(body.basis.mesh.boundaries[name])
+        kind, facets = body.basis.mesh.refdom.__name__, np.asarray(body.basis.mesh.boundaries[name])
+        faces, outward = face_nodes(body.basis, body.degree, facets)
         return Surface(
             body.name,
             body.locations[:, trace.nodes],
@@ -228,7 +230,7 @@ class AssembledElastic:
             tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
             held[unknowns[:, trace.nodes]],
             trace.cells,
-            Mesh(body.basis, body.degree, facets, body.weight, body.locations, unknowns, held, curve),
+            Mesh(kind, body.degree, faces, outward, body.weight, body.locations, unknowns, held, curve),
         )
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:

@@ -35,18 +35,20 @@ Product = Callable[[np.ndarray, float | None], np.ndarray]
 class Mesh:
     """The finite elements behind a contact surface, for couplings that integrate over it.
 
-    basis      scikit-fem basis of the displacement, which holds the mesh;  degree  of the displacement, 1 or 2
-    facets     (f,) numbers of the mesh facets that make up the surface
+    kind       name of the reference element, a key of contactopt.bodies.elements.FACES;  degree  of the displacement, 1 or 2
+    faces      (f, j) nodes of the faces that make up the surface: corners in cyclic order, then those on edges, then the centre
+    outward    (dim, f) their mean outward normals
     measure    factor of all integrals (thickness, mirror images), and whether they also carry the radius r
-    locations  (dim, nodes) positions of all nodes of the body [length];  unknowns (dim, nodes) their displacement unknowns
+    locations  (dim, nodes) positions of the nodes [length];  unknowns (dim, nodes) their displacement unknowns
     held       (n,) mask of the unknowns that are not free
     curve      function (dim, j) -> (dim, j) that puts points of the facets on the surface that the mesh stands for; None:
                the facets are this surface
     """
 
-    basis: Any
+    kind: str
     degree: int
-    facets: np.ndarray
+    faces: np.ndarray
+    outward: np.ndarray
     measure: tuple[float, bool]
     locations: np.ndarray
     unknowns: np.ndarray

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contactopt.bodies.concurrency import each
 from contactopt.bodies.fields import Fields
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution
@@ -12,5 +13,6 @@ __all__ = ["Fields", "recover"]
 def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:
     """Displacement and stress of the elastic bodies of a solved scene, upper body first."""
     displaced = zip(reduction.bodies, reduction.displaced(solution.reactions, solution.multipliers))
-    fields = (body.fields(U) for body, U in displaced)
+    parallel = [body.parallel for body in reduction.bodies]
+    fields = each(lambda pair: pair[0].fields(pair[1]), displaced, parallel)
     return tuple(found for found in fields if found is not None)

@@ -26,6 +26,7 @@ import scipy.sparse as sp
 from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
 from contactopt.bodies.protocol import AssembledBody, Body, Product
+from contactopt.bodies.ranks import RemotePart
 from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
@@ -102,7 +103,12 @@ class Reduction:
     def displaced(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, ...]:
         """The displacements U (n,) of every body under reactions (k, dim) and multipliers (p,)."""
         parts = zip(self.bodies, self.maps, self.own_multipliers(multipliers))
-        return tuple(body.displacement(B.T @ reactions.ravel(), own) for body, B, own in parts)
+
+        def displaced(part: tuple[Body, sp.csr_matrix, np.ndarray]) -> np.ndarray:
+            body, B, own = part
+            return body.displacement(B.T @ reactions.ravel(), own)
+
+        return each(displaced, parts, [body.parallel for body in self.bodies])
 
     def loaded(self, scene: Scene) -> Reduction:
         """The same bodies, coupling and Q under the loads of another scene of the same structure.
@@ -112,7 +118,8 @@ class Reduction:
         """
         _check_same(self.scene, scene)
         start = time.perf_counter()
-        bodies = tuple(old.loaded(scene, part) for old, part in zip(self.bodies, scene.parts))
+        pairs = zip(self.bodies, scene.parts)
+        bodies = each(lambda pair: pair[0].loaded(scene, pair[1]), pairs, [body.parallel for body in self.bodies])
         q, V, s = _linear_terms(bodies, self.maps, self.couplings)
         law = _law(scene.pairs, self.couplings)
         problem = replace(self.problem, q=q, V=V, s=s, law=law, motions=_names(bodies))
@@ -222,7 +229,8 @@ def reduce_bodies(
         check_number("the contact zone's half-width", zone, low=0.0)
     seconds: dict[str, float] = {}
     start = time.perf_counter()
-    assembled = [assemble(scene, part, elements, zone) for part in scene.parts]
+    elsewhere = [isinstance(part, RemotePart) for part in scene.parts]
+    assembled = each(lambda part: assemble(scene, part, elements, zone), scene.parts, elsewhere)
     named = {body.name: body for body in assembled}
     sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
     coupled = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in zip(scene.pairs, sides))
@@ -326,7 +334,8 @@ def _operator(
     diagonal = estimate_diagonal(product, weights, np.any(moved, axis=0))
     complete, iterative = all(body.complete for body in bodies), any(body.iterative for body in bodies)
     entries = (lambda: dense(_entries(bodies, maps))) if complete else None
-    coupled = coupled_form(bodies, maps) if iterative else None
+    whole = [body.equilibrium is not None for body in bodies if body.iterative]
+    coupled = coupled_form(bodies, maps) if iterative and all(whole) else None
     return InterfaceOperator(product, diagonal, entries, None, iterative, coupled)
 
 
@@ -340,17 +349,16 @@ def _entries(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarra
     n = maps[0].shape[0]
     thin = _filling(maps) < SPARSE * n**2
     Q = sp.csr_array((n, n)) if thin else np.zeros((n, n))
-    for body, B in zip(bodies, maps):
-        if not body.moved(B).any():
-            continue
-        rows = _rows(B)
+    moving = [(body, B, _rows(B)) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    parallel = [body.parallel for body, *_ in moving]
+    for (*_, rows), C in zip(moving, each(lambda term: term[0].compliance(term[1][term[2]]), moving, parallel)):
         if thin:
             place = np.repeat(rows, len(rows)), np.tile(rows, len(rows))
-            Q = Q + sp.csr_array((body.compliance(B[rows]).ravel(), place), (n, n))
+            Q = Q + sp.csr_array((C.ravel(), place), (n, n))
         elif len(rows) == n:
-            Q += body.compliance(B)
+            Q += C
         else:
-            Q[np.ix_(rows, rows)] += body.compliance(B[rows])
+            Q[np.ix_(rows, rows)] += C
     return Q
 
 

@@ -1,0 +1,314 @@
+"""A body on another rank: what rank 0 knows of it are the displacement unknowns of its contact surfaces.
+
+The body itself, its mesh, its stiffness and its solver stay on their rank. Here its unknowns are only those m of the nodes of
+its contact surfaces, in the order in which the body itself numbers them. Contact forces go there, and displacements of
+these unknowns come back. A displacement of the whole body is kept on its rank and stands here as a Field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.bodies.elastic import AssembledElastic, ElasticBody, assemble_elastic
+from contactopt.bodies.fields import Fields
+from contactopt.bodies.protocol import Mesh, Product, Surface
+from contactopt.bodies.ranks import Kept, RemotePart, Team, values_of
+from contactopt.errors import InputError
+from contactopt.scenes.scene import Part, Scene
+
+
+def _sent(scene: Scene, part: Part) -> tuple[Scene, Part]:
+    """Scene and part as their rank needs them: without the meshes of the other bodies."""
+
+    def change(other: Any) -> Any:
+        if not isinstance(other, Part):
+            return other
+        values = values_of(other)
+        return Part(**(values if other.name == part.name else values | {"mesh": None, "curve": None}))
+
+    own = replace(scene.with_parts(change), reference=None)
+    return own, next(other for other in own.parts if other.name == part.name)
+
+
+class Field:
+    """A vector (n,) of all unknowns of a body, on its rank: sums, multiples and scalar products, as load paths need them."""
+
+    def __init__(self, team: Team, kept: Kept):
+        self.team, self.kept = team, kept
+
+    def _make(self, function: Any, *arguments: Any) -> Field:
+        return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, *arguments))
+
+    def __add__(self, other: Field) -> Field:
+        return self._make(np.add, other.kept)
+
+    def __sub__(self, other: Field) -> Field:
+        return self._make(np.subtract, other.kept)
+
+    def __rmul__(self, factor: float) -> Field:
+        return self._make(np.multiply, factor)
+
+    def __matmul__(self, other: Field) -> float:
+        return float(self.team.ask(self.kept.rank, np.dot, self.kept, other.kept))
+
+
+# ---- on the rank of the body ----
+
+
+@dataclass(frozen=True)
+class Resident:
+    """An elastic body on its rank, with the unknowns (m,) of its contact surfaces among its own."""
+
+    body: ElasticBody
+    skin: np.ndarray
+
+    def wide(self, T: sp.csr_matrix) -> sp.csr_matrix:
+        """A map (rows, m) of the contact unknowns as one (rows, n) of all unknowns."""
+        return sp.csr_matrix((T.data, self.skin[T.indices], T.indptr), (T.shape[0], len(self.body.at_rest)))
+
+    def force(self, F: np.ndarray) -> np.ndarray:
+        """Forces (m,) on the contact unknowns as nodal forces (n,)."""
+        full = np.zeros(len(self.body.at_rest))
+        full[self.skin] = F
+        return full
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What rank 0 knows of a body, as in contactopt.bodies.protocol.Body, on its contact unknowns."""
+
+    name: str
+    unknowns: int
+    at_rest: np.ndarray
+    motions: np.ndarray
+    motion_names: tuple[str, ...]
+    resultants: np.ndarray
+    iterative: bool
+    complete: bool
+
+
+def _skin(assembled: AssembledElastic) -> np.ndarray:
+    return np.sort(assembled.body.contact_dofs, axis=None)
+
+
+def _surface(assembled: AssembledElastic, name: str | None) -> Surface:
+    """The surface in terms of the contact unknowns alone, and its mesh by the nodes of the contact surfaces alone."""
+    body, skin, whole = assembled.body, _skin(assembled), assembled.surface(name)
+    place = np.full(len(body.load), -1)
+    place[skin] = np.arange(len(skin))
+    traces = tuple(
+        sp.csr_matrix((trace.data, place[trace.indices], trace.indptr), (trace.shape[0], len(skin)))
+        for trace in whole.traces
+    )
+    assert whole.mesh is not None
+    nodes = body.surface_nodes
+    number = np.full(whole.mesh.locations.shape[1], -1)
+    number[nodes] = np.arange(len(nodes))
+    mesh = replace(
+        whole.mesh,
+        faces=number[whole.mesh.faces],
+        locations=whole.mesh.locations[:, nodes],
+        unknowns=place[whole.mesh.unknowns[:, nodes]],
+        held=whole.mesh.held[skin],
+    )
+    return replace(whole, traces=traces, mesh=mesh)
+
+
+def _sizes(assembled: AssembledElastic) -> tuple[int, int]:
+    return assembled.unknowns, assembled.interface_unknowns
+
+
+def _prepared(assembled: AssembledElastic, solver: str, entries: bool) -> Resident:
+    return Resident(assembled.prepare(solver, entries), _skin(assembled))
+
+
+def _facts(own: Resident) -> Facts:
+    body, skin = own.body, own.skin
+    at_rest, motions = body.at_rest[skin], body.motions[skin]
+    return Facts(
+        body.name, body.unknowns, at_rest, motions, body.motion_names, body.resultants, body.iterative, body.complete
+    )
+
+
+def _product(own: Resident, T: sp.csr_matrix) -> Product:
+    return own.body.product(own.wide(T))
+
+
+def _act(product: Product, X: np.ndarray, accuracy: float | None) -> np.ndarray:
+    return product(X, accuracy)
+
+
+def _compliance(own: Resident, T: sp.csr_matrix) -> np.ndarray:
+    return own.body.compliance(own.wide(T))
+
+
+def _moved(own: Resident, T: sp.csr_matrix) -> np.ndarray:
+    return own.body.moved(own.wide(T))
+
+
+def _displacement(own: Resident, F: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    return own.body.displacement(own.force(F), multipliers)
+
+
+def _energy(own: Resident, U: np.ndarray) -> float:
+    return own.body.energy(U)
+
+
+def _external_forces(own: Resident, U: np.ndarray) -> np.ndarray:
+    return own.body.external_forces(U)
+
+
+def _held_by(own: Resident, U: np.ndarray, F: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """As ElasticBody.held_by, without the places on which no force acts."""
+    found = own.body.held_by(U, own.force(F))
+    acting = {name: forces.any(axis=0) for name, (_, forces) in found.items()}
+    return {name: (points[:, acting[name]], forces[:, acting[name]]) for name, (points, forces) in found.items()}
+
+
+def _fields(own: Resident, U: np.ndarray) -> Fields:
+    return own.body.fields(U)
+
+
+def _loaded(own: Resident, scene: Scene, part: Part) -> Resident:
+    return replace(own, body=own.body.loaded(scene, part))
+
+
+# ---- on rank 0 ----
+
+
+@dataclass(frozen=True, eq=False)
+class RemoteBody:
+    """A body on another rank, as contactopt.bodies.protocol.Body asks; its n unknowns are the m of its contact surfaces."""
+
+    team: Team
+    kept: Kept
+    facts: Facts
+    parallel = True
+    equilibrium = None
+
+    def _ask(self, function: Any, *arguments: Any) -> Any:
+        return self.team.ask(self.kept.rank, function, self.kept, *arguments)
+
+    def _keep(self, function: Any, *arguments: Any) -> Kept:
+        return self.team.keep(self.kept.rank, function, self.kept, *arguments)
+
+    @property
+    def name(self) -> str:
+        return self.facts.name
+
+    @property
+    def unknowns(self) -> int:
+        return self.facts.unknowns
+
+    @property
+    def at_rest(self) -> np.ndarray:
+        return self.facts.at_rest
+
+    @property
+    def motions(self) -> np.ndarray:
+        return self.facts.motions
+
+    @property
+    def motion_names(self) -> tuple[str, ...]:
+        return self.facts.motion_names
+
+    @property
+    def resultants(self) -> np.ndarray:
+        return self.facts.resultants
+
+    @property
+    def iterative(self) -> bool:
+        return self.facts.iterative
+
+    @property
+    def complete(self) -> bool:
+        return self.facts.complete
+
+    def product(self, T: sp.csr_matrix) -> Product:
+        made = self._keep(_product, T)
+        return lambda X, accuracy: self.team.ask(made.rank, _act, made, X, accuracy)
+
+    def convolution(self, T: sp.csr_matrix) -> None:
+        return None
+
+    def compliance(self, T: sp.csr_matrix) -> np.ndarray:
+        return np.asarray(self._ask(_compliance, T))
+
+    def moved(self, T: sp.csr_matrix) -> np.ndarray:
+        return np.asarray(self._ask(_moved, T))
+
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> Any:
+        return Field(self.team, self._keep(_displacement, force, multipliers))
+
+    def energy(self, U: Any) -> float:
+        return float(self._ask(_energy, U.kept))
+
+    def external_forces(self, U: Any) -> Any:
+        return Field(self.team, self._keep(_external_forces, U.kept))
+
+    def held_by(self, U: Any, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        found: dict[str, tuple[np.ndarray, np.ndarray]] = self._ask(_held_by, U.kept, force)
+        return found
+
+    def fields(self, U: Any) -> Fields:
+        found: Fields = self._ask(_fields, U.kept)
+        return found
+
+    def loaded(self, scene: Scene, part: Part) -> RemoteBody:
+        return _known(self.team, self._keep(_loaded, *_sent(scene, part)))
+
+
+def _known(team: Team, kept: Kept) -> RemoteBody:
+    return RemoteBody(team, kept, team.ask(kept.rank, _facts, kept))
+
+
+@dataclass(frozen=True, eq=False)
+class AssembledRemote:
+    """An assembled body on another rank, as contactopt.bodies.protocol.AssembledBody asks."""
+
+    team: Team
+    kept: Kept
+    name: str
+    meshed = True
+
+    def _ask(self, function: Any, *arguments: Any) -> Any:
+        return self.team.ask(self.kept.rank, function, self.kept, *arguments)
+
+    @cached_property
+    def _sizes(self) -> Sequence[int]:
+        found: tuple[int, int] = self._ask(_sizes)
+        return found
+
+    @property
+    def unknowns(self) -> int:
+        return self._sizes[0]
+
+    @property
+    def interface_unknowns(self) -> int:
+        return self._sizes[1]
+
+    def iterates(self, solver: str) -> bool:
+        return bool(self._ask(AssembledElastic.iterates, solver))
+
+    def surface(self, name: str | None = None) -> Surface:
+        found: Surface = self._ask(_surface, name)
+        return found
+
+    def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
+        raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
+
+    def prepare(self, solver: str, entries: bool) -> RemoteBody:
+        return _known(self.team, self.team.keep(self.kept.rank, _prepared, self.kept, solver, entries))
+
+
+def assemble_remote(scene: Scene, part: RemotePart, elements: int, zone: float | None) -> AssembledRemote:
+    """A RemotePart of a scene, assembled on its rank."""
+    team: Team = part.team
+    kept = team.keep(part.rank, assemble_elastic, *_sent(scene, part), elements, zone)
+    return AssembledRemote(team, kept, part.name)
