@@ -29,9 +29,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code: 0 solved, 1 not solved, 2 bad input."""
     told = sys.argv[1:] if arguments is None else list(arguments)
     options = make_parser().parse_args(told)
+    return _answered(lambda: _execute(options, told))
+
+
+def _execute(options: argparse.Namespace, told: list[str]) -> int:
+    """One command, on all ranks where mpiexec started several."""
     if (comm := world()) is None:
         ranks = getattr(options, "ranks", None)
-        return _answered(lambda: options.command(options) if ranks is None else launch(ranks, told))
+        return int(options.command(options) if ranks is None else launch(ranks, told))
     if comm.rank:
         serve(comm)
         return 0

@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.problem.coupled import BodyTerm, LocalTerm
+
 if TYPE_CHECKING:
     from contactopt.bodies.fields import Fields
     from contactopt.problem.chart import Chart
@@ -74,6 +76,18 @@ class Equilibrium:
     diagonal: np.ndarray
     free: np.ndarray
     low_rank: tuple[np.ndarray, np.ndarray]
+
+    def term(self, T: sp.csr_matrix) -> LocalTerm:
+        """The part of T C T' for a map T (rows, n) of the contact unknowns, before condensation."""
+        left, right = self.low_rank
+        return LocalTerm(T[:, self.free], self.stiffness, self.cycle, self.diagonal, (T @ left, T @ right))
+
+
+class Equilibrated(Protocol):
+    """The linear system of a body that is solved by iteration, wherever the body is: Equilibrium is that of a body here."""
+
+    def term(self, T: sp.csr_matrix) -> BodyTerm:
+        """The part of T C T' for a map T (rows, n) of the contact unknowns, before condensation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +203,7 @@ class Body(Protocol):
     def parallel(self) -> bool: ...
 
     @property
-    def equilibrium(self) -> Equilibrium | None:
+    def equilibrium(self) -> Equilibrated | None:
         """Its linear system where it is solved by iteration; None where products are direct."""
 
     def product(self, T: sp.csr_matrix) -> Product:

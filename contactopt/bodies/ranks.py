@@ -1,8 +1,8 @@
 """Processes that MPI started: rank 0 runs the program, the others keep objects for it and act on them.
 
-Rank 0 sends an order, a function with its arguments, and receives what it returned or raised. A function may leave its
-result on its rank; rank 0 then holds a Kept that stands for it in later orders. Every order is one message out and one
-message back, and both are counted with their bytes.
+Rank 0 sends an order, a function with its arguments, and receives what it returned or raised. Or the result stays on its
+rank, and rank 0 holds a Kept that stands for it in later orders; then no message comes back. Every rank follows its orders
+one after the other. All messages are counted with their bytes.
 
 Whoever waits for a message sleeps between two looks, so that ranks that share a core do not take it from each other.
 """
@@ -19,6 +19,7 @@ import threading
 import time
 import traceback
 import weakref
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from importlib.util import find_spec
@@ -69,6 +70,11 @@ class Traffic:
     messages: int = 0
     bytes: int = 0
 
+    def add(self, message: bytes | bytearray) -> None:
+        """Count one message."""
+        self.messages += 1
+        self.bytes += len(message)
+
 
 class Team:
     """All ranks, seen from rank 0. Orders may be given by several threads at the same time."""
@@ -78,7 +84,8 @@ class Team:
         self.traffic = Traffic()
         self._lock = threading.Lock()  # MPI need not allow threads at the same time
         self._number = 0
-        self._freed: list[list[int]] = [[] for _ in range(comm.size)]
+        self._sent: list[tuple[Any, bytes]] = []
+        self._freed: list[deque[int]] = [deque() for _ in range(comm.size)]
 
     @property
     def size(self) -> int:
@@ -87,14 +94,29 @@ class Team:
 
     def ask(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Any:
         """What the function returns on that rank; an exception that it raises is raised here."""
-        return self._order(rank, function, arguments, None)
+        return self.start(rank, function, *arguments)()
+
+    def start(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+        """The same in two steps: the work begins now, and the function returned waits for its end."""
+        tag = FIRST + self._next_number() % TICKETS
+        self._order(rank, (tag, function, arguments))
+
+        def end() -> Any:
+            reply = _receive(self.comm, self._lock, rank, tag)
+            with self._lock:
+                self.traffic.add(reply)
+            answer = pickle.loads(reply)
+            if isinstance(answer, Raised):
+                answer.error.add_note(f"on rank {rank}:\n{answer.place}")
+                raise answer.error
+            return answer
+
+        return end
 
     def keep(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Kept:
-        """The same, but the result stays there."""
-        with self._lock:
-            self._number += 1
-            kept = Kept(rank, self._number)
-        self._order(rank, function, arguments, kept.number)
+        """What stands for the result, which stays there. Nobody waits for it: whoever uses it learns of an exception."""
+        kept = Kept(rank, self._next_number())
+        self._order(rank, (None, function, arguments), kept.number)
         weakref.finalize(kept, self._freed[rank].append, kept.number).atexit = False
         return kept
 
@@ -105,24 +127,30 @@ class Team:
     def dismiss(self) -> None:
         """End the loops of all other ranks."""
         for rank in range(1, self.size):
-            _send(self.comm, self._lock, _packed(None), rank, ORDERS)
+            self._order(rank, None)
+        while self._sent:
+            self._forget_what_arrived()
+            time.sleep(SHORTEST)
 
-    def _order(self, rank: int, function: Callable[..., Any], arguments: tuple[Any, ...], number: int | None) -> Any:
+    def _next_number(self) -> int:
         with self._lock:
             self._number += 1
-            tag = FIRST + self._number % TICKETS
-            freed, self._freed[rank][:] = list(self._freed[rank]), []
-        order = _packed((tag, function, arguments, number, freed))
-        _send(self.comm, self._lock, order, rank, ORDERS)
-        reply = _receive(self.comm, self._lock, rank, tag)
+            return self._number
+
+    def _order(self, rank: int, order: Any, number: int | None = None) -> None:
+        """Send without waiting; the bytes are kept until they have arrived."""
+        freed, waiting = [], self._freed[rank]
+        while waiting:
+            freed.append(waiting.popleft())
+        data = _packed((order, number, freed))
         with self._lock:
-            self.traffic.messages += 2
-            self.traffic.bytes += len(order) + len(reply)
-        answer = pickle.loads(reply)
-        if isinstance(answer, Raised):
-            answer.error.add_note(f"on rank {rank}:\n{answer.place}")
-            raise answer.error
-        return answer
+            self._sent.append((self.comm.Isend([data, _byte()], rank, ORDERS), data))
+            self.traffic.add(data)
+        self._forget_what_arrived()
+
+    def _forget_what_arrived(self) -> None:
+        with self._lock:
+            self._sent = [item for item in self._sent if not item[0].Test()]
 
 
 @dataclass(frozen=True)
@@ -154,21 +182,29 @@ def serve(comm: Any) -> None:
     kept: dict[int, Any] = {}
     lock = threading.Lock()
     while True:
-        order = pickle.loads(_receive(comm, lock, 0, ORDERS))
+        order, number, freed = pickle.loads(_receive(comm, lock, 0, ORDERS))
         if order is None:
             return
-        tag, function, arguments, number, freed = order
         for old in freed:
             del kept[old]
-        try:
-            result = function(*(kept[a.number] if isinstance(a, _Reference) else a for a in arguments))
-            if number is not None:
-                kept[number], result = result, None
-            reply = _packed(result)
-        except Exception as error:
-            reply = _packed(Raised(_portable(error), traceback.format_exc()))
-        del order, arguments
-        _send(comm, lock, reply, 0, tag)
+        result = _result(kept, *order[1:])
+        if number is not None:
+            kept[number] = result
+        else:
+            _send(comm, lock, _packed(result), 0, order[0])
+        del order, result
+
+
+def _result(kept: dict[int, Any], function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """What the function makes of its arguments, or the exception: its own, or that which an argument should have been."""
+    found = [kept[item.number] if isinstance(item, _Reference) else item for item in arguments]
+    for item in found:
+        if isinstance(item, Raised):
+            return item
+    try:
+        return function(*found)
+    except Exception as error:
+        return Raised(_portable(error), traceback.format_exc())
 
 
 def _portable(error: Exception) -> Exception:

@@ -7,7 +7,8 @@ these unknowns come back. A displacement of the whole body is kept on its rank a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import operator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -20,6 +21,8 @@ from contactopt.bodies.fields import Fields
 from contactopt.bodies.protocol import Mesh, Product, Surface
 from contactopt.bodies.ranks import Kept, RemotePart, Team, values_of
 from contactopt.errors import InputError
+from contactopt.problem.coupled import LocalTerm
+from contactopt.problem.stacked import dot
 from contactopt.scenes.scene import Part, Scene
 
 
@@ -36,26 +39,46 @@ def _sent(scene: Scene, part: Part) -> tuple[Scene, Part]:
     return own, next(other for other in own.parts if other.name == part.name)
 
 
+@dataclass(frozen=True, eq=False)
 class Field:
-    """A vector (n,) of all unknowns of a body, on its rank: sums, multiples and scalar products, as load paths need them."""
+    """A vector of the unknowns of a body, on its rank, with the operators of an array that the callers of bodies use."""
 
-    def __init__(self, team: Team, kept: Kept):
-        self.team, self.kept = team, kept
+    team: Team
+    kept: Kept
+    elsewhere = True
 
-    def _make(self, function: Any, *arguments: Any) -> Field:
-        return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, *arguments))
+    def _make(self, function: Any, other: Any) -> Field:
+        own = other.kept if isinstance(other, Field) else other
+        return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, own))
 
     def __add__(self, other: Field) -> Field:
-        return self._make(np.add, other.kept)
+        return self._make(operator.add, other)
 
     def __sub__(self, other: Field) -> Field:
-        return self._make(np.subtract, other.kept)
+        return self._make(operator.sub, other)
+
+    def __mul__(self, other: Field | float) -> Field:
+        return self._make(operator.mul, other)
 
     def __rmul__(self, factor: float) -> Field:
-        return self._make(np.multiply, factor)
+        return self._make(operator.mul, factor)
+
+    def __truediv__(self, other: Field | float) -> Field:
+        return self._make(operator.truediv, other)
+
+    def __pow__(self, power: float) -> Field:
+        return self._make(operator.pow, power)
 
     def __matmul__(self, other: Field) -> float:
-        return float(self.team.ask(self.kept.rank, np.dot, self.kept, other.kept))
+        return float(self.team.ask(self.kept.rank, operator.matmul, self.kept, other.kept))
+
+    def astype(self, kind: Any) -> Field:
+        """The vector in another precision."""
+        return self._make(np.ndarray.astype, kind)
+
+    def started_dot(self, other: Field) -> Callable[[], float]:
+        """The scalar product, when it is called; the work begins now."""
+        return self.team.start(self.kept.rank, dot, self.kept, other.kept)
 
 
 # ---- on the rank of the body ----
@@ -91,6 +114,7 @@ class Facts:
     resultants: np.ndarray
     iterative: bool
     complete: bool
+    equilibrated: bool
 
 
 def _skin(assembled: AssembledElastic) -> np.ndarray:
@@ -129,11 +153,30 @@ def _prepared(assembled: AssembledElastic, solver: str, entries: bool) -> Reside
 
 
 def _facts(own: Resident) -> Facts:
-    body, skin = own.body, own.skin
-    at_rest, motions = body.at_rest[skin], body.motions[skin]
-    return Facts(
-        body.name, body.unknowns, at_rest, motions, body.motion_names, body.resultants, body.iterative, body.complete
-    )
+    body, skin, equilibrated = own.body, own.skin, own.body.solver.iteration is not None
+    named, solved = (body.name, body.unknowns), (body.iterative, body.complete, equilibrated)
+    return Facts(*named, body.at_rest[skin], body.motions[skin], body.motion_names, body.resultants, *solved)
+
+
+def _term(own: Resident, T: sp.csr_matrix) -> LocalTerm:
+    assert own.body.equilibrium is not None
+    return own.body.equilibrium.term(own.wide(T))
+
+
+def _size(term: LocalTerm) -> tuple[int, tuple[np.ndarray, np.ndarray]]:
+    return term.size, term.low_rank
+
+
+def _trace(term: LocalTerm, X: np.ndarray) -> np.ndarray:
+    return term.started_trace(X)()
+
+
+def _stiffness(term: LocalTerm, X: np.ndarray) -> np.ndarray:
+    return term.stiffness(X)
+
+
+def _cycle(term: LocalTerm, F: np.ndarray) -> np.ndarray:
+    return term.cycle(F)
 
 
 def _product(own: Resident, T: sp.csr_matrix) -> Product:
@@ -183,6 +226,61 @@ def _loaded(own: Resident, scene: Scene, part: Part) -> Resident:
 
 
 @dataclass(frozen=True, eq=False)
+class RemoteTerm:
+    """The term of a body on another rank, as contactopt.problem.coupled.BodyTerm asks.
+
+    rows  (m,) rows of u that the body moves, which alone travel;   length  number of all rows
+    """
+
+    team: Team
+    kept: Kept
+    rows: np.ndarray
+    length: int
+    size: int
+    low_rank: tuple[np.ndarray, np.ndarray]
+    elsewhere = True
+
+    def _make(self, function: Any, *arguments: Any) -> Field:
+        return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, *arguments))
+
+    def diagonal(self) -> Field:
+        return self._make(LocalTerm.diagonal)
+
+    def stiffness(self, X: Field) -> Field:
+        return self._make(_stiffness, X.kept)
+
+    def cycle(self, F: Field) -> Field:
+        return self._make(_cycle, F.kept)
+
+    def pulled(self, r: np.ndarray) -> Field:
+        return self._make(LocalTerm.pulled, r[self.rows])
+
+    def started_trace(self, X: Field) -> Callable[[], np.ndarray]:
+        own = self.team.start(self.kept.rank, _trace, self.kept, X.kept)
+
+        def end() -> np.ndarray:
+            u = np.zeros(self.length)
+            u[self.rows] = own()
+            return u
+
+        return end
+
+
+@dataclass(frozen=True, eq=False)
+class RemoteEquilibrium:
+    """The linear system of a body on another rank, which is solved by iteration there."""
+
+    body: RemoteBody
+
+    def term(self, T: sp.csr_matrix) -> RemoteTerm:
+        team, rows = self.body.team, np.flatnonzero(np.diff(T.indptr))
+        kept = team.keep(self.body.kept.rank, _term, self.body.kept, T[rows])
+        size, low_rank = team.ask(kept.rank, _size, kept)
+        spread = sp.csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), (T.shape[0], len(rows)))
+        return RemoteTerm(team, kept, rows, T.shape[0], size, (spread @ low_rank[0], spread @ low_rank[1]))
+
+
+@dataclass(frozen=True, eq=False)
 class RemoteBody:
     """A body on another rank, as contactopt.bodies.protocol.Body asks; its n unknowns are the m of its contact surfaces."""
 
@@ -190,7 +288,6 @@ class RemoteBody:
     kept: Kept
     facts: Facts
     parallel = True
-    equilibrium = None
 
     def _ask(self, function: Any, *arguments: Any) -> Any:
         return self.team.ask(self.kept.rank, function, self.kept, *arguments)
@@ -229,6 +326,10 @@ class RemoteBody:
     @property
     def complete(self) -> bool:
         return self.facts.complete
+
+    @property
+    def equilibrium(self) -> RemoteEquilibrium | None:
+        return RemoteEquilibrium(self) if self.facts.equilibrated else None
 
     def product(self, T: sp.csr_matrix) -> Product:
         made = self._keep(_product, T)

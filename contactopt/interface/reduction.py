@@ -334,8 +334,7 @@ def _operator(
     diagonal = estimate_diagonal(product, weights, np.any(moved, axis=0))
     complete, iterative = all(body.complete for body in bodies), any(body.iterative for body in bodies)
     entries = (lambda: dense(_entries(bodies, maps))) if complete else None
-    whole = [body.equilibrium is not None for body in bodies if body.iterative]
-    coupled = coupled_form(bodies, maps) if iterative and all(whole) else None
+    coupled = coupled_form(bodies, maps) if iterative else None
     return InterfaceOperator(product, diagonal, entries, None, iterative, coupled)
 
 
