@@ -290,6 +290,17 @@ def launch(ranks: int, arguments: Sequence[str]) -> int:
     InputError
         If the packages of the extra `mpi` are missing.
     """
+    start = mpiexec(ranks)
+    with tempfile.TemporaryDirectory() as folder:
+        outcome = Path(folder) / "exit code"
+        environment = {name: "1" for name in ONE_THREAD} | dict(os.environ) | {OUTCOME: str(outcome)}
+        command = [*start, sys.executable, "-m", "contactopt", *arguments]
+        code = subprocess.run(command, env=environment, check=False).returncode
+        return int(outcome.read_text()) if outcome.exists() else ended_early(code)
+
+
+def mpiexec(ranks: int) -> list[str]:
+    """The beginning of a command that runs on several ranks of this machine; InputError where MPI is missing."""
     check_count("the number of ranks", ranks)
     program = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or shutil.which("mpiexec")
     if program is None or find_spec("mpi4py") is None:
@@ -297,12 +308,7 @@ def launch(ranks: int, arguments: Sequence[str]) -> int:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     placed = ["--bind-to", "core", "--map-by", "core"] if ranks <= cores else ["--oversubscribe", "--bind-to", "none"]
     root = ["--allow-run-as-root"] if getattr(os, "geteuid", lambda: 1)() == 0 else []  # whoever is root runs this as root
-    with tempfile.TemporaryDirectory() as folder:
-        outcome = Path(folder) / "exit code"
-        environment = {name: "1" for name in ONE_THREAD} | dict(os.environ) | {OUTCOME: str(outcome)}
-        command = [program, *root, *placed, "-n", str(ranks), sys.executable, "-m", "contactopt", *arguments]
-        code = subprocess.run(command, env=environment, check=False).returncode
-        return int(outcome.read_text()) if outcome.exists() else ended_early(code)
+    return [program, *root, *placed, "-n", str(ranks)]
 
 
 def ended_early(code: int) -> int:
