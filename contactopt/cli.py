@@ -88,7 +88,9 @@ def make_parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--quantity", metavar="NAME", help="what --accuracy bounds: " + ", ".join(QUANTITIES))
     run.add_argument("--tol", type=float, metavar="T", help="bound on the natural-map residual (1e-8)")
-    run.add_argument("--ranks", type=int, metavar="N", help="processes among which the bodies are dealt out (needs mpi4py)")
+    run.add_argument(
+        "--ranks", type=int, metavar="N", help="processes among which the bodies are dealt out (needs mpi4py)"
+    )
     new = commands.add_parser("new", help="write a scene file to start from, an example that runs")
     new.set_defaults(command=_new)
     new.add_argument("file", metavar="FILE", help="name of the file, ends in .toml; an existing one is not overwritten")
@@ -123,7 +125,7 @@ def _on_ranks(options: argparse.Namespace, team: Team) -> int:
     if options.ranks not in (None, team.size):
         raise InputError(f"--ranks {options.ranks} was asked for, but mpiexec started {team.size} ranks.")
     code = _run(options, team)
-    print(f"{team.size} ranks, {team.traffic.messages} messages, {team.traffic.bytes} bytes")
+    print(f"{team.size} ranks, {team.traffic.messages} messages, {team.traffic.length} bytes")
     return code
 
 

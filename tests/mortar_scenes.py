@@ -10,8 +10,8 @@ import numpy as np
 import skfem
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce_bodies
-from contactopt.interface.coupling import COUPLINGS, Coupling
 from contactopt.bodies.elements import face_nodes
+from contactopt.interface.coupling import COUPLINGS, Coupling
 from contactopt.interface.faces import faces_of
 from contactopt.interface.mortar import Mortar, mortar
 from contactopt.interface.reduction import Reduction

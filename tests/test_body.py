@@ -112,16 +112,16 @@ def test_motions_that_nothing_holds_are_found(kind, supports, motions):
             boundary, held = s, components[int(s[-1])]
         chosen.append(Support(boundary, dict.fromkeys(held, 0.0)))
     body = body_of(kind, supports=tuple(chosen))
-    Z, held = body.rigid.fields, np.setdiff1d(np.arange(len(body.load)), body.free)
-    assert sorted(body.rigid.names) == sorted(motions)
+    Z, held = body.rigid_motions.fields, np.setdiff1d(np.arange(len(body.load)), body.free)
+    assert sorted(body.rigid_motions.names) == sorted(motions)
     assert Z.shape[1] == len(motions) and not np.any(Z[held])
     if not motions:
         return
     assert np.linalg.matrix_rank(Z) == len(motions)
     assert np.abs(body.A @ Z).max() < 1e-12 * abs(body.A).max()
-    kept = np.setdiff1d(body.free, body.rigid.fixing)
+    kept = np.setdiff1d(body.free, body.rigid_motions.fixing)
     assert np.linalg.eigvalsh(body.A[kept][:, kept].toarray()).min() > 0
-    assert np.allclose(Z.T @ body.rigid.forces, np.eye(len(motions)))
+    assert np.allclose(Z.T @ body.rigid_motions.forces, np.eye(len(motions)))
 
 
 @pytest.mark.parametrize(

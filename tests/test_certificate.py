@@ -134,3 +134,25 @@ def test_the_independent_check_can_fail():
 
 def test_no_contacts_are_solved():
     assert natural_map_residual(InterfaceProblem(np.zeros((0, 0)), np.zeros((0, 2)), 0.3), np.zeros((0, 2))) == 0.0
+
+
+def rigid_table(gaps, mu=0.3, push=(-100.0, 20.0)):
+    """A rigid table on three legs in the plane, with gaps below them; no compliance anywhere."""
+    places = np.array([-1.0, 0.2, 1.0])
+    V = np.zeros((3, 2, 3))
+    V[:, 0, 0], V[:, 1, 1], V[:, 0, 2] = 1.0, 1.0, places
+    q = np.column_stack([gaps, np.zeros(3)])
+    return InterfaceProblem(np.zeros((6, 6)), q, mu, V.reshape(6, 3), np.array([*push, 0.1 * push[0]]))
+
+
+@pytest.mark.parametrize("gaps", [(0.0, 0.0, 0.0), (0.5, 0.7, 0.4), (1e-3, 2e-3, 5e-3)])
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_rigid_bodies_without_any_compliance(gaps, unit):
+    """Statics alone: the forces balance the load, and the legs that bear force stand on the floor."""
+    problem = rigid_table(unit * np.array(gaps))
+    solution = solve(problem)
+    assert solution.solved
+    u = problem.displacements(solution.reactions, solution.multipliers) / unit
+    assert np.allclose(problem.V.T @ solution.reactions.ravel(), -problem.s)
+    assert np.all(u[:, 0] > -1e-9) and np.all(np.abs(u[solution.reactions[:, 0] > 1e-6, 0]) < 1e-9)
+    assert str(solve(rigid_table(unit * np.array(gaps), push=(-100.0, 40.0))).status) == "infeasible"

@@ -256,12 +256,12 @@ def test_a_large_array_is_announced_and_a_huge_one_refused(monkeypatch, caplog):
     from contactopt.problem import operators
 
     scene = scenes.flat_punch(2, elements=4)  # 5 contacts: 10 x 10 entries, 800 bytes
-    monkeypatch.setattr(operators, "NOTABLE", 800)
+    monkeypatch.setattr(operators, "NOTABLE_BYTES", 800)
     with caplog.at_level("INFO"):
         reduce(scene, Q="explicit")
     assert "10 x 10 entries: 800 bytes" in caplog.text and "solver superlu" in caplog.text
     assert "explicit Q of 10 unknowns" in caplog.text
-    monkeypatch.setattr(operators, "MOST", 799)
+    monkeypatch.setattr(operators, "MOST_BYTES", 799)
     with pytest.raises(InputError, match="would take 800 bytes, more than 799; take Q = 'implicit'"):
         reduce(scene, Q="explicit")
     assert reduce(scene, Q="implicit").contacts == 5

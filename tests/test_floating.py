@@ -125,10 +125,10 @@ def test_the_compliance_does_not_depend_on_the_fixing_unknowns():
     made = assemble(scene, scene.parts[1], 1, None).body
     corner, opposite = (int(choose(made.locations.sum(axis=0))) for choose in (np.argmin, np.argmax))
     fixing = np.sort([*made.unknowns[:, corner], made.unknowns[0, opposite]])
-    other = replace(made, rigid=replace(made.rigid, fixing=fixing))
+    other = replace(made, rigid_motions=replace(made.rigid_motions, fixing=fixing))
     T = reduce_bodies(scene).maps[1]
     first, second = (elastic_bodies.condense(body).compliance(T) for body in (made, other))
-    assert not np.array_equal(made.rigid.fixing, other.rigid.fixing)
+    assert not np.array_equal(made.rigid_motions.fixing, other.rigid_motions.fixing)
     assert np.allclose(first, second, atol=1e-10 * np.abs(first).max())
     assert np.linalg.eigvalsh(first).min() > 0
 
@@ -149,7 +149,7 @@ def test_multipliers_are_mean_displacements():
     solution = solve(reduction.problem, tol=1e-12)
     body = reduction.bodies[1]
     U = reduction.displaced(solution.reactions, solution.multipliers)[1]
-    mean = body.body.rigid.forces.T @ U
+    mean = body.body.rigid_motions.forces.T @ U
     assert np.allclose(mean, solution.multipliers, atol=1e-12)
 
 

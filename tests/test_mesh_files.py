@@ -252,7 +252,7 @@ def test_hostile_files_end_in_one_sentence(tmp_path, monkeypatch):
         with pytest.raises(InputError, match=name) as caught:
             load_mesh(tmp_path / name)
         assert "\n" not in str(caught.value) and len(str(caught.value)) < 500
-    monkeypatch.setattr(mesh_formats, "LARGEST", 10)
+    monkeypatch.setattr(mesh_formats, "MOST_BYTES", 10)
     with pytest.raises(InputError, match="bytes"):
         load_mesh(good)
     monkeypatch.undo()

@@ -56,7 +56,7 @@ try:
     found = {}
     for case, (scene, options) in cases.items():
         one = contactopt.run(scene, **options)
-        before = (team.traffic.messages, team.traffic.bytes)
+        before = (team.traffic.messages, team.traffic.length)
         many = contactopt.run(scene, team=team, **options)
         found[case] = {
             "same": bool(np.array_equal(one.solution.reactions, many.solution.reactions)),
@@ -73,9 +73,9 @@ try:
         scene = scenes.flat_punch(2, elements=8, foundation_height=height)
         problem = contactopt.reduce(spread(scene, team), Q="implicit")
         problem.Q @ np.ones(len(problem.Q.diagonal))
-        before = (team.traffic.messages, team.traffic.bytes)
+        before = (team.traffic.messages, team.traffic.length)
         problem.Q @ np.ones(len(problem.Q.diagonal))
-        sent = (team.traffic.messages - before[0], team.traffic.bytes - before[1])
+        sent = (team.traffic.messages - before[0], team.traffic.length - before[1])
         found["traffic"].append((*sent, sum(body.unknowns for body in contactopt.reduce_bodies(scene).bodies)))
     bad = flat(lower=replace(flat().lower, mesh=torn))
     try:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.benchmark.measure import Task
-from contactopt.benchmark.plugins import find_plugin
+from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.process import one_line
 from contactopt.benchmark.runs import PASSED
 from contactopt.errors import BackendError, InputError
@@ -43,14 +43,14 @@ def no_answer(status: str, error: object, measured: dict[str, float] | None = No
     return {"status": status, "message": one_line(error), "measured": measured or {}, "history": None, **blank}
 
 
-def measure(task: Task, problem: InterfaceProblem, start: Solution | None) -> dict[str, Any]:
+def measure(task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry) -> dict[str, Any]:
     """Run the method; its answer, or how it failed, in the form of contactopt.benchmark.measure.Answer."""
     random.seed(task.seed)
     np.random.seed(task.seed)  # noqa: NPY002 (a plug-in may use the global generator)
     measured = {"base_mb": reset_peak()}
     wall, cpu = time.perf_counter(), time.process_time()
     try:
-        outcome: Outcome | Exception = call(task, problem, start)
+        outcome: Outcome | Exception = call(task, problem, start, plugins)
     except (Exception, SystemExit) as error:
         outcome = error if isinstance(error, Exception) else RuntimeError(f"it called exit({error})")
     measured |= {"call_seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}
@@ -95,10 +95,10 @@ def real(values: Any) -> np.ndarray:
     return np.array(array, dtype=float, order="C", subok=False)
 
 
-def call(task: Task, problem: InterfaceProblem, start: Solution | None) -> Outcome:
+def call(task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry) -> Outcome:
     """Run the method; its own errors pass through."""
     spec, tol = task.run.method, None if task.run.setting == "default" else task.run.tolerance
-    plugin = None if spec.name in METHODS else find_plugin(spec.name)
+    plugin = None if spec.name in METHODS else plugins.find(spec.name)
     if plugin is None or plugin.iterates:
         method = find_method(spec.name, **spec.settings) if plugin is None else plugin.make(**spec.settings)
         settings: dict[str, Any] = {} if tol is None else {"tol": tol}

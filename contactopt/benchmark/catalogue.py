@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from contactopt.benchmark.plugins import LAWS, find_plugin, load_plugins, plugin_problems
+from contactopt.benchmark.plugins import LAWS, Registry
 from contactopt.benchmark.process import START, Ended, Process
 from contactopt.errors import InputError
 from contactopt.solving.methods import METHODS
@@ -89,14 +89,13 @@ def arguments_of(function: Callable[..., Any]) -> Arguments:
 def declare(paths: Sequence[str], names: Sequence[str]) -> dict[str, Any]:
     """Load plug-ins and list what they declare; runs in the process of its own. {"error": sentence} if one fails."""
     try:
-        load_plugins(paths)
+        plugins = Registry()
+        plugins.load(paths)
         for name in names:
-            find_plugin(name)
-        from contactopt.benchmark import plugins
-
+            plugins.find(name)
         return {
-            "methods": {p.name: (p.law, p.iterates, arguments_of(p.make)) for p in plugins._methods.values()},
-            "problems": {name: arguments_of(make) for name, make in plugin_problems().items()},
+            "methods": {p.name: (p.law, p.iterates, arguments_of(p.make)) for p in plugins.methods.values()},
+            "problems": {name: arguments_of(make) for name, make in plugins.problems.items()},
         }
     except InputError as error:
         return {"error": str(error)}

@@ -23,7 +23,11 @@ from contactopt.errors import InputError
 
 MOST_RUNS = 200_000  # of one experiment
 BOUNDS = {"time_limit": (0.0, 1e6), "memory_limit": (0.2, 1e4)}  # s; GB: less than the least holds no NumPy and SciPy
-MOST = {"repeats": MOST_RUNS, "max_iterations": 10**9, "seed": 2**32 - 1}  # NumPy's generator takes no larger seed
+MOST_ALLOWED = {
+    "repeats": MOST_RUNS,
+    "max_iterations": 10**9,
+    "seed": 2**32 - 1,
+}  # NumPy's generator takes no larger seed
 LARGEST_INTEGER = 2**63  # of whole numbers, as in TOML
 
 
@@ -157,7 +161,7 @@ class _Reader:
         for key in ("plugins", "columns"):
             if not all(isinstance(value, str) for value in data.get(key, ())):
                 raise self.located(f"'{key}' must be a list of texts", key)
-        for key, most in MOST.items():
+        for key, most in MOST_ALLOWED.items():
             value, least = data.get(key, 1), int(key != "seed")
             if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
                 raise self.located(f"'{key}' must be a whole number from {least} to {most}; got {short(value)}", key)

@@ -9,7 +9,8 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -35,13 +36,46 @@ class Plugin:
         return hasattr(self.make, "iterate")
 
 
-_methods: dict[str, Plugin] = {}
-_problems: dict[str, Callable[..., Any]] = {}
-_loaded: set[Path] = set()
+@dataclass(frozen=True)
+class Registry:
+    """What plug-in files have declared to one process. The process owns it and hands it to whoever runs plug-ins.
+
+    methods   by name
+    problems  functions that return problems, by name
+    loaded    the files that were run
+    """
+
+    methods: dict[str, Plugin] = field(default_factory=dict)
+    problems: dict[str, Callable[..., Any]] = field(default_factory=dict)
+    loaded: set[Path] = field(default_factory=set)
+
+    def load(self, paths: Iterable[str | Path]) -> None:
+        """Run plug-in files, each of them once; InputError, naming the file, if one fails."""
+        for path in map(Path, paths):
+            if path not in self.loaded:
+                token = _receiving.set(self)
+                try:
+                    _run(path)
+                finally:
+                    _receiving.reset(token)
+                self.loaded.add(path)
+
+    def find(self, name: str) -> Plugin | None:
+        """The method of that name, from a loaded file or an entry point; None if there is none."""
+        if name not in self.methods:
+            for point in entry_points(group=GROUP, name=name):
+                self.methods[name] = Plugin(name, point.load())
+        return self.methods.get(name)
+
+
+# The registry that receives what the plug-in file declares that is being run; None at any other time.
+_receiving: ContextVar[Registry | None] = ContextVar("receiving", default=None)
 
 
 def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -> Any:
-    """Register a function or class as a method of the benchmark, under its own name or `name`.
+    """Declare a function or class as a method of the benchmark, under its own name or `name`.
+
+    The declaration counts where a campaign runs the file. Everywhere else the function or class is returned as it is.
 
     A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s], `max_iterations` and `start`
     (a Solution or None) are passed if it has such arguments, `tol` not at the setting "default" if it has a default. It
@@ -56,17 +90,21 @@ def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -
         plugin = Plugin(_name("method", make, name), make, law)
         if plugin.name in METHODS:
             raise InputError(f"plug-in method {plugin.name!r} has the name of a method of contactopt; rename it.")
-        _methods[plugin.name] = plugin
+        registry = _receiving.get()
+        if registry is not None:
+            registry.methods[plugin.name] = plugin
         return make
 
     return register if make is None else register(make)
 
 
 def problem(make: Any = None, *, name: str | None = None) -> Any:
-    """Register a function of named parameters that returns an InterfaceProblem, for `family = NAME`."""
+    """Declare a function of named parameters that returns an InterfaceProblem, for `family = NAME`."""
 
     def register(make: Any) -> Any:
-        _problems[_name("problem", make, name)] = make
+        found, registry = _name("problem", make, name), _receiving.get()
+        if registry is not None:
+            registry.problems[found] = make
         return make
 
     return register if make is None else register(make)
@@ -82,31 +120,15 @@ def _name(kind: str, make: Any, name: object) -> str:
     return found
 
 
-def load_plugins(paths: Iterable[str | Path]) -> None:
-    """Run plug-in files once per process; InputError, naming the file, if one fails."""
-    for path in map(Path, paths):
-        if path in _loaded:
-            continue
-        digest = hashlib.sha256(str(path).encode()).hexdigest()[:8]
-        spec = spec_from_file_location(f"contactopt_plugin_{path.stem}_{digest}", path)
-        if spec is None or spec.loader is None or not path.is_file():
-            raise InputError(f"plug-in '{path}' is not a Python file.")
-        module = module_from_spec(spec)
-        sys.modules[spec.name] = module  # dataclasses look their module up
-        try:
-            spec.loader.exec_module(module)
-        except (Exception, SystemExit) as error:
-            raise InputError(f"plug-in '{path}' failed: {type(error).__name__}: {error}") from error
-        _loaded.add(path)
-
-
-def find_plugin(name: str) -> Plugin | None:
-    """The plug-in method of that name, from a loaded file or an entry point; None if there is none."""
-    if name not in _methods:
-        for point in entry_points(group=GROUP, name=name):
-            _methods[name] = Plugin(name, point.load())
-    return _methods.get(name)
-
-
-def plugin_problems() -> dict[str, Callable[..., Any]]:
-    return _problems
+def _run(path: Path) -> None:
+    """Run a plug-in file as a module of its own."""
+    digest = hashlib.sha256(str(path).encode()).hexdigest()[:8]
+    spec = spec_from_file_location(f"contactopt_plugin_{path.stem}_{digest}", path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise InputError(f"plug-in '{path}' is not a Python file.")
+    module = module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        raise InputError(f"plug-in '{path}' failed: {type(error).__name__}: {error}") from error

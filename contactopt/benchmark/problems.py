@@ -12,7 +12,6 @@ import numpy as np
 import scipy.linalg as la
 
 from contactopt.benchmark.catalogue import Arguments, arguments_of, bind
-from contactopt.benchmark.plugins import plugin_problems
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.coulomb import Coulomb
@@ -54,15 +53,18 @@ class ProblemSpec:
             except TypeError as error:
                 raise InputError(f"family '{self.name}': {error}.") from error
 
-    def build(self) -> InterfaceProblem:
-        """InputError on parameters that make no problem."""
+    def build(self, declared: Mapping[str, Callable[..., Any]]) -> InterfaceProblem:
+        """The problem; InputError on parameters that make none.
+
+        declared  functions of the problems that plug-ins declare, by name
+        """
         if self.kind == "scene":
             return reduced(self.name, **self.parameters)
         if self.kind == "fclib":
             from contactopt.fclib import read
 
             return read(self.path)
-        problem = (FAMILIES | plugin_problems())[self.name](**self.parameters)
+        problem = (FAMILIES | dict(declared))[self.name](**self.parameters)
         if not isinstance(problem, InterfaceProblem):
             raise InputError(f"family '{self.name}' must return an InterfaceProblem; got {type(problem).__name__}.")
         return problem

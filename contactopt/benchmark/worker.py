@@ -20,7 +20,7 @@ import numpy as np
 
 from contactopt.benchmark.calls import call, measure, no_answer
 from contactopt.benchmark.measure import Task
-from contactopt.benchmark.plugins import load_plugins
+from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
 from contactopt.benchmark.wire import Channel
@@ -44,6 +44,7 @@ class Runner:
 
     def __init__(self, note: Note):
         self.note = note
+        self.plugins = Registry()
         self.problem: InterfaceProblem
         self.start: Solution | None = None
         self.warm: set[tuple[str, int]] = set()
@@ -54,7 +55,7 @@ class Runner:
         self.note("solve")
         if problem is not None:
             self.problem, self.start = problem, None
-        load_plugins(task.plugins)
+        self.plugins.load(task.plugins)
         start = None
         if task.run.start == "warm":
             try:
@@ -63,7 +64,7 @@ class Runner:
                 return no_answer("not_built", error)
         if task.warm_up:
             self.warm_up(task, self.problem.dim)
-        return measure(task, self.problem, start)
+        return measure(task, self.problem, start, self.plugins)
 
     def warm_start(self) -> Solution:
         """The certified solution of the same problem at NEIGHBOUR times its load and friction."""
@@ -86,30 +87,36 @@ class Runner:
         q = np.zeros((2, dim))
         q[:, 0], q[:, 1] = -1.0, 0.5
         with suppress(Exception):  # the run itself will tell
-            call(task, InterfaceProblem(Q, q, Coulomb(np.full(2, 0.5))), None)
+            call(task, InterfaceProblem(Q, q, Coulomb(np.full(2, 0.5))), None, self.plugins)
         self.warm.add(mark)
         self.note("solve")
 
 
-def build(spec: ProblemSpec, plugins: tuple[str, ...], diagnosed: bool, memory_limit: float) -> dict[str, Any]:
-    """The problem with the seconds that it took and its diagnosis, or {"error": sentence}."""
-    limit_memory(memory_limit)
-    try:
-        load_plugins(plugins)
-        begin = time.perf_counter()
-        problem = spec.build()
-        seconds = time.perf_counter() - begin
-        if isinstance(problem.Q, InterfaceOperator):
-            raise InputError(
-                f"problem '{spec.label}' must have Q as a matrix; a benchmark hands it to other processes."
-            )
-        return {
-            "problem": problem,
-            "build_seconds": seconds,
-            "diagnosis": diagnosis(problem) if diagnosed else {},
-        }
-    except (Exception, SystemExit) as error:
-        return {"error": one_line(error)}
+class Builder:
+    """Builds problems, one request after another. It keeps what plug-ins declared."""
+
+    def __init__(self) -> None:
+        self.plugins = Registry()
+
+    def build(self, spec: ProblemSpec, paths: tuple[str, ...], diagnosed: bool, memory_limit: float) -> dict[str, Any]:
+        """The problem with the seconds that it took and its diagnosis, or {"error": sentence}."""
+        limit_memory(memory_limit)
+        try:
+            self.plugins.load(paths)
+            begin = time.perf_counter()
+            problem = spec.build(self.plugins.problems)
+            seconds = time.perf_counter() - begin
+            if isinstance(problem.Q, InterfaceOperator):
+                raise InputError(
+                    f"problem '{spec.label}' must have Q as a matrix; a benchmark hands it to other processes."
+                )
+            return {
+                "problem": problem,
+                "build_seconds": seconds,
+                "diagnosis": diagnosis(problem) if diagnosed else {},
+            }
+        except (Exception, SystemExit) as error:
+            return {"error": one_line(error)}
 
 
 def diagnosis(problem: InterfaceProblem) -> dict[str, float]:
@@ -152,7 +159,7 @@ def _serve_inspect(note: Note) -> Callable[..., Any]:
 
 ROLES: dict[str, Callable[[Note], Callable[..., Any]]] = {
     "inspect": _serve_inspect,
-    "build": lambda note: build,
+    "build": lambda note: Builder().build,
     "solve": lambda note: Runner(note).execute,
 }
 

@@ -30,11 +30,11 @@ class Assembly:
 
     A       (n, n) sparse stiffness; singular on the free unknowns if there are free motions
     load    (n,) nodal forces of tractions and body forces
-    lift    (n,) prescribed displacements of the supports, 0 elsewhere
+    prescribed (n,) prescribed displacements of the supports, 0 elsewhere
     motion  (n, p) unit motions of the p plate components that may move; zero on free unknowns
-    thrust  (p,) total forces on them
+    plate_forces (p,) total forces on them
     traces  name of each candidate contact boundary -> trace of the displacement there: nodes, areas, normals, weights, cells
-    rigid   rigid motions that no support and no plate holds
+    rigid_motions  rigid motions that no support and no plate holds
     driven  what each column of `motion` is, for messages
     holders name of each support and plate -> the unknowns that it holds or drives, each unknown with one of them
     """
@@ -46,12 +46,12 @@ class Assembly:
     weight: tuple[float, bool]
     A: sp.csr_matrix
     load: np.ndarray
-    lift: np.ndarray
+    prescribed: np.ndarray
     free: np.ndarray
     motion: np.ndarray
-    thrust: np.ndarray
+    plate_forces: np.ndarray
     traces: Mapping[str, Trace]
-    rigid: Motions
+    rigid_motions: Motions
     driven: tuple[str, ...]
     holders: Mapping[str, np.ndarray]
 
@@ -126,9 +126,9 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
             f"body '{part.name}': its mesh falls into {pieces} pieces; remove nodes that belong to no element, "
             "merge duplicated nodes, or model each piece as a body of its own."
         )
-    lift, held, motion, thrust, driven, holders = _constraints(scene, part, basis)
-    rigid = free_motions(scene.kind, scene.components, basis, node_unknowns(basis), held, weight)
-    check_free(part.name, A, rigid)
+    prescribed, held, motion, plate_forces, driven, holders = _constraints(scene, part, basis)
+    rigid_motions = free_motions(scene.kind, scene.components, basis, node_unknowns(basis), held, weight)
+    check_free(part.name, A, rigid_motions)
     surfaces = scene.surfaces_of(part)
     contacts = {name: contact_trace(basis, scene.degree, mesh.boundaries[name], weight) for name in surfaces}
     return Assembly(
@@ -139,12 +139,12 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         weight,
         A,
         _load(part, basis, weight),
-        lift,
+        prescribed,
         np.flatnonzero(~held),
         motion,
-        thrust,
+        plate_forces,
         contacts,
-        rigid,
+        rigid_motions,
         driven,
         holders,
     )
@@ -152,10 +152,10 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
 
 def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     """The same body under the load values of another scene; InputError if other unknowns are held or driven there."""
-    lift, held, motion, thrust, *_ = _constraints(scene, part, body.basis)
+    prescribed, held, motion, plate_forces, *_ = _constraints(scene, part, body.basis)
     if not np.array_equal(np.flatnonzero(~held), body.free) or not np.array_equal(motion, body.motion):
         raise InputError(f"body '{part.name}': supports or plates hold other unknowns than before; reduce it anew.")
-    return replace(body, load=_load(part, body.basis, body.weight), lift=lift, thrust=thrust)
+    return replace(body, load=_load(part, body.basis, body.weight), prescribed=prescribed, plate_forces=plate_forces)
 
 
 def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
@@ -201,7 +201,7 @@ def _constraints(
     scene: Scene, part: Part, basis: skfem.CellBasis
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, tuple[str, ...], dict[str, np.ndarray]]:
     """Prescribed displacements, mask of unknowns that are not free, plate motions, forces and names, and who holds what."""
-    lift, held = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
+    prescribed, held = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
     table = node_unknowns(basis)
 
     def unknowns(boundary: str, component: str) -> np.ndarray:
@@ -218,14 +218,14 @@ def _constraints(
         values = dict.fromkeys(scene.components, 0.0) if support.displacement is None else support.displacement
         for component, value in values.items():
             where = unknowns(support.boundary, component)
-            if np.any(held[where] & (lift[where] != value)):
+            if np.any(held[where] & (prescribed[where] != value)):
                 raise InputError(
                     f"body '{part.name}': the support on {support.boundary!r} prescribes {component} = {value:g} at a "
                     "node where another support prescribes a different value."
                 )
-            lift[where], held[where] = value, True
+            prescribed[where], held[where] = value, True
             holds(f"support '{support.boundary}'", where)
-    columns, thrust, names = [], [], []
+    columns, plate_forces, names = [], [], []
     supported = held.copy()
     for plate in (load for load in part.loads if isinstance(load, Plate)):
         for component in scene.components:
@@ -239,11 +239,11 @@ def _constraints(
                 column = np.zeros(basis.N)
                 column[where] = 1.0
                 columns.append(column)
-                thrust.append(plate.force[component])
+                plate_forces.append(plate.force[component])
                 names.append(f"plate '{plate.boundary}' along {component}")
             elif not plate.glued:
                 continue
-            elif np.any(lift[where] != 0):
+            elif np.any(prescribed[where] != 0):
                 raise InputError(
                     f"body '{part.name}': a support moves the plate on {plate.boundary!r}, which holds {component}; "
                     "drop the plate or the support."
@@ -252,4 +252,4 @@ def _constraints(
             holds(f"plate '{plate.boundary}'", where)
         supported = held.copy()
     motion = np.stack(columns, axis=1) if columns else np.zeros((basis.N, 0))
-    return lift, held, motion, np.array(thrust, dtype=float), tuple(names), holders
+    return prescribed, held, motion, np.array(plate_forces, dtype=float), tuple(names), holders

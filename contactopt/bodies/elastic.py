@@ -3,10 +3,13 @@
 A rigid plate on the body moves it: the plate's unit motion M, extended into the body by the stiffness A, is the
 displacement field Z = M - A_ff^-1 A_f: M. Contact forces F and loads f meet in the balance of the plates,
 
-    Z' A Z lambda = thrust + Z' (f - A lift) + Z' F.
+    Z' A Z lambda = p + Z' (f - A g) + Z' F,
+
+with the total forces p on the plates and the displacements g that supports prescribe.
 
 Motions that no support resists, the kernel of Z' A Z, become multipliers of the interface problem. The others add to the
-compliance: C = A_ff^-1 + soft soft', where each column of `soft` is one of them, scaled by its stiffness.
+compliance: C = A_ff^-1 + E E', where each column of E, the elastic modes, is one of them divided by the square root of its
+stiffness.
 
 Rigid motions that neither supports nor plates hold are multipliers, too. A_ff^-1 is then the generalised inverse of
 contactopt.bodies.motions, the inverse G on the unknowns `kept` with a correction of low rank.
@@ -24,10 +27,11 @@ import scipy.sparse as sp
 from contactopt.bodies.body import Assembly, build_body, reload_body
 from contactopt.bodies.elements import face_nodes
 from contactopt.bodies.fields import Fields, fields_of
-from contactopt.bodies.protocol import Equilibrium, Mesh, Product, Surface
+from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.errors import InputError
+from contactopt.problem.operators import Product
 from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)
@@ -45,7 +49,7 @@ class ElasticBody:
     relief      (n, i) the fields Y of the i free rigid motions (contactopt.bodies.motions)
     extended    (n, j) displacement fields Z of all plate motions
     modes       (j, p) and (j, j - p) combinations of them that move freely, and those with elastic resistance, scaled so
-                that each field `soft` = Z modes[1] adds soft soft' to the compliance
+                that the elastic modes E = Z modes[1] add E E' to the compliance
     resultants  (p + i,) resultants s of the loads in the free motions, those of plates first
     """
 
@@ -95,15 +99,15 @@ class ElasticBody:
     @cached_property
     def motions(self) -> np.ndarray:
         """(n, p + i) displacement fields of the free motions, those of plates first."""
-        return np.concatenate([self.extended @ self.modes[0], self.body.rigid.fields], axis=1)
+        return np.concatenate([self.extended @ self.modes[0], self.body.rigid_motions.fields], axis=1)
 
     @property
     def motion_names(self) -> tuple[str, ...]:
         strongest = np.argmax(np.abs(self.modes[0]), axis=0) if self.modes[0].size else []
-        return (*(self.body.driven[i] for i in strongest), *self.body.rigid.names)
+        return (*(self.body.driven[i] for i in strongest), *self.body.rigid_motions.names)
 
     @cached_property
-    def soft(self) -> np.ndarray:
+    def elastic_modes(self) -> np.ndarray:
         """(n, j - p) displacement fields of the plate motions that supports resist."""
         return np.asarray(self.extended @ self.modes[1])
 
@@ -116,10 +120,10 @@ class ElasticBody:
 
     def _low_rank(self, T: sp.csr_matrix) -> tuple[np.ndarray, np.ndarray]:
         """L, R (rows, j) with T C T' = T G T' + L R'."""
-        soft, Z, Y = T @ self.soft, T @ self.body.rigid.fields, T @ self.relief
+        E, Z, Y = T @ self.elastic_modes, T @ self.body.rigid_motions.fields, T @ self.relief
         if not Z.shape[1]:
-            return soft, soft  # one array, so that their product is symmetric to the last digit
-        return np.concatenate([soft, -Z, -Y], axis=1), np.concatenate([soft, Y, Z], axis=1)
+            return E, E  # one array, so that their product is symmetric to the last digit
+        return np.concatenate([E, -Z, -Y], axis=1), np.concatenate([E, Y, Z], axis=1)
 
     def product(self, T: sp.csr_matrix) -> Product:
         local, act, (left, right) = T[:, self.interface], self._restricted, self._low_rank(T)
@@ -144,12 +148,12 @@ class ElasticBody:
 
     def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """U of all unknowns, eq (13) of the paper."""
-        U = self.at_rest + self.soft @ (self.soft.T @ force) + self.motions @ multipliers
+        U = self.at_rest + self.elastic_modes @ (self.elastic_modes.T @ force) + self.motions @ multipliers
         return np.asarray(U + self.relieved(force))
 
     def relieved(self, force: np.ndarray) -> np.ndarray:
         """Displacements (n,) or (n, j) under nodal forces on the free unknowns, with plates at rest."""
-        U, Z = np.zeros(force.shape), self.body.rigid.fields
+        U, Z = np.zeros(force.shape), self.body.rigid_motions.fields
         U[self.kept] = self.solver.solve(force[self.kept])
         return np.asarray(U - Z @ (self.relief.T @ force) - self.relief @ (Z.T @ force))
 
@@ -160,7 +164,7 @@ class ElasticBody:
         """Loads on free unknowns, reactions of supports, and on the unknowns of each plate its total force, shared out."""
         body, F = self.body, self.body.A @ U
         F[body.free] = body.load[body.free]
-        total = body.thrust + body.motion.T @ body.load
+        total = body.plate_forces + body.motion.T @ body.load
         return np.asarray(F + body.motion @ ((total - body.motion.T @ F) / body.motion.sum(axis=0)))
 
     def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -277,12 +281,12 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     dofs, n = body.unknowns, len(body.load)
     node, component, place = np.empty(n, int), np.empty(n, int), np.full(n, -1)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
-    kept = np.setdiff1d(body.free, body.rigid.fixing)
+    kept = np.setdiff1d(body.free, body.rigid_motions.fixing)
     place[kept] = np.arange(len(kept))
     interface = np.intersect1d(body.contact_dofs, kept)
     A = body.A[kept][:, kept]
-    last = place[interface] if entries else None
-    made = make_solver(solver, System(A, node[kept], component[kept], body.locations, last))
+    trailing = place[interface] if entries else None
+    made = make_solver(solver, System(A, node[kept], component[kept], body.locations, trailing))
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
     relief = _relief(body, made, kept)
     # A plate that alone holds a body along itself moves it as a rigid whole, for which there is nothing to solve.
@@ -291,19 +295,21 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     strained = lacking > RIGID * forces
     if strained.any():
         extended[np.ix_(kept, strained)] -= made.solve((body.A @ extended[:, strained])[kept])
-    if len(body.rigid.names):
-        extended -= body.rigid.fields @ (body.rigid.forces.T @ extended)
+    if len(body.rigid_motions.names):
+        extended -= body.rigid_motions.fields @ (body.rigid_motions.forces.T @ extended)
     K = extended.T @ (body.A @ extended)
     stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
     moves = stiffness <= KERNEL * np.max(np.sum(body.motion * (body.A @ body.motion), axis=0), initial=0.0)
     free = np.eye(len(K)) if moves.all() else vectors[:, moves]  # keep one multiplier per plate component
     modes = free, vectors[:, ~moves] / np.sqrt(stiffness[~moves])
-    return _at_rest(ElasticBody(body, made, kept, interface, body.lift, relief, extended, modes, body.thrust), body)
+    return _at_rest(
+        ElasticBody(body, made, kept, interface, body.prescribed, relief, extended, modes, body.plate_forces), body
+    )
 
 
 def _relief(body: Assembly, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
     """Y = G S - Z (S' G S) / 2 of contactopt.bodies.motions, (n, i)."""
-    Z, S = body.rigid.fields, body.rigid.forces
+    Z, S = body.rigid_motions.fields, body.rigid_motions.forces
     Y = np.zeros(Z.shape)
     if Z.shape[1]:
         Y[kept] = solver.solve(S[kept])
@@ -328,8 +334,8 @@ def _rigid_extension(body: Assembly) -> np.ndarray:
 
 def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:
     """The body `old` under the loads of `body`."""
-    residual = body.load - body.A @ body.lift
-    thrust = body.thrust + old.extended.T @ residual
-    at_rest = body.lift + old.soft @ (old.modes[1].T @ thrust) + old.relieved(residual)
-    resultants = np.concatenate([old.modes[0].T @ thrust, body.rigid.fields.T @ body.load])
+    residual = body.load - body.A @ body.prescribed
+    resisted = body.plate_forces + old.extended.T @ residual
+    at_rest = body.prescribed + old.elastic_modes @ (old.modes[1].T @ resisted) + old.relieved(residual)
+    resultants = np.concatenate([old.modes[0].T @ resisted, body.rigid_motions.fields.T @ body.load])
     return replace(old, body=body, at_rest=at_rest, resultants=resultants)

@@ -19,11 +19,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
-from contactopt.bodies.protocol import Product, Surface
+from contactopt.bodies.protocol import Surface
 from contactopt.errors import InputError
 from contactopt.material import lame
 from contactopt.problem.chart import Chart
 from contactopt.problem.convolution import Convolution, Kernel, embedding
+from contactopt.problem.operators import Product
 from contactopt.scenes.scene import HalfSpace, Scene
 
 

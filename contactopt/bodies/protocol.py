@@ -28,9 +28,7 @@ if TYPE_CHECKING:
     from contactopt.bodies.fields import Fields
     from contactopt.problem.chart import Chart
     from contactopt.problem.convolution import Kernel
-
-# (X (rows, j), relative accuracy or None for the best there is) -> T C T' X (rows, j)
-Product = Callable[[np.ndarray, float | None], np.ndarray]
+    from contactopt.problem.operators import Product
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,15 +65,15 @@ class Raised:
 
 @dataclass
 class Traffic:
-    """What was sent and received by rank 0."""
+    """What was sent and received by rank 0: messages, and their length together in bytes."""
 
     messages: int = 0
-    bytes: int = 0
+    length: int = 0
 
     def add(self, message: bytes | bytearray) -> None:
         """Count one message."""
         self.messages += 1
-        self.bytes += len(message)
+        self.length += len(message)
 
 
 class Team:
@@ -307,7 +307,9 @@ def mpiexec(ranks: int) -> list[str]:
         raise InputError("ranks need mpi4py and mpiexec: pip install 'contactopt[mpi]'.")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     placed = ["--bind-to", "core", "--map-by", "core"] if ranks <= cores else ["--oversubscribe", "--bind-to", "none"]
-    root = ["--allow-run-as-root"] if getattr(os, "geteuid", lambda: 1)() == 0 else []  # whoever is root runs this as root
+    root = (
+        ["--allow-run-as-root"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
+    )  # whoever is root runs this as root
     return [program, *root, *placed, "-n", str(ranks)]
 
 

@@ -18,10 +18,11 @@ import scipy.sparse as sp
 
 from contactopt.bodies.elastic import AssembledElastic, ElasticBody, assemble_elastic
 from contactopt.bodies.fields import Fields
-from contactopt.bodies.protocol import Mesh, Product, Surface
+from contactopt.bodies.protocol import Surface
 from contactopt.bodies.ranks import Kept, RemotePart, Team, values_of
 from contactopt.errors import InputError
 from contactopt.problem.coupled import LocalTerm
+from contactopt.problem.operators import Product
 from contactopt.problem.stacked import dot
 from contactopt.scenes.scene import Part, Scene
 
@@ -35,8 +36,7 @@ def _sent(scene: Scene, part: Part) -> tuple[Scene, Part]:
         values = values_of(other)
         return Part(**(values if other.name == part.name else values | {"mesh": None, "curve": None}))
 
-    own = replace(scene.with_parts(change), reference=None)
-    return own, next(other for other in own.parts if other.name == part.name)
+    return replace(scene.with_parts(change), reference=None), Part(**values_of(part))
 
 
 @dataclass(frozen=True, eq=False)
@@ -410,6 +410,7 @@ class AssembledRemote:
 
 def assemble_remote(scene: Scene, part: RemotePart, elements: int, zone: float | None) -> AssembledRemote:
     """A RemotePart of a scene, assembled on its rank."""
-    team: Team = part.team
+    team = part.team
+    assert team is not None
     kept = team.keep(part.rank, assemble_elastic, *_sent(scene, part), elements, zone)
     return AssembledRemote(team, kept, part.name)

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import Product, Surface
+from contactopt.bodies.protocol import Surface
 from contactopt.errors import InputError
+from contactopt.problem.operators import Product
 from contactopt.scenes.scene import Rigid, Scene
 
 

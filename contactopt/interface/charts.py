@@ -100,16 +100,16 @@ def _clockwise(normals: np.ndarray) -> np.ndarray:
 def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
     """The planes across one component on which exactly the tangential displacement along it is held."""
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
-    for c, still in enumerate(held):
-        if not still.any():
+    for c, mask in enumerate(held):
+        if not mask.any():
             continue
-        there = points[c, still]
+        there = points[c, mask]
         offset = float(there.mean())
         plane = np.abs(points[c] - offset) <= NEAR * contacts.size
         side = np.sign(points[c, ~plane] - offset)
         tangential = np.all(np.abs(normals[c, plane]) < 0.5)
         moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > NEAR), axis=0)  # along the normal, at least
-        if np.array_equal(plane, still) and len(set(side)) == 1 and tangential and np.all(moves):
+        if np.array_equal(plane, mask) and len(set(side)) == 1 and tangential and np.all(moves):
             inward = np.zeros(len(points))
             inward[c] = side[0]
             planes.append(SymmetryPlane(inward, offset * side[0]))

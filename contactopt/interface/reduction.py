@@ -25,7 +25,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
-from contactopt.bodies.protocol import AssembledBody, Body, Product
+from contactopt.bodies.protocol import AssembledBody, Body
 from contactopt.bodies.ranks import RemotePart
 from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
@@ -36,9 +36,17 @@ from contactopt.problem import InterfaceProblem, Law, Pair
 from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
-from contactopt.problem.operators import FORMS, InterfaceOperator, check_dense, dense, estimate_diagonal, nodal_weights
+from contactopt.problem.operators import (
+    FORMS,
+    InterfaceOperator,
+    Product,
+    check_dense,
+    dense,
+    estimate_diagonal,
+    nodal_weights,
+)
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene import MOST_ELEMENTS, Part, Scene
+from contactopt.scenes.scene import MOST_ACROSS, Part, Scene
 
 log = logging.getLogger(__name__)
 SPARSE = 0.25  # share of the entries of Q that may be other than zero for it to be kept by sparse rows
@@ -223,8 +231,8 @@ def reduce_bodies(
     elements = scene.elements if elements is None else elements
     zone = scene.zone if zone is None else zone
     check_count("elements", elements)
-    if elements > MOST_ELEMENTS:
-        raise InputError(f"elements must be at most {MOST_ELEMENTS}; got {elements}.")
+    if elements > MOST_ACROSS:
+        raise InputError(f"elements must be at most {MOST_ACROSS}; got {elements}.")
     if zone is not None:
         check_number("the contact zone's half-width", zone, low=0.0)
     seconds: dict[str, float] = {}

@@ -47,12 +47,12 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
     sides = [_faces(body.name, mesh) for body, mesh in zip((upper, lower), meshes)]
     m = mortar(sides[0], sides[1], pair.carrier)
     mine, theirs = meshes[m.own], meshes[1 - m.own]
-    held = mine.held[mine.unknowns[:, m.nodes]]
-    still = np.stack([m.alone[1 - m.own] @ ~theirs.held[row] == 0 for row in theirs.unknowns])
+    own_held = mine.held[mine.unknowns[:, m.nodes]]
+    other_held = np.stack([m.alone[1 - m.own] @ ~theirs.held[row] == 0 for row in theirs.unknowns])
     cells = _cells(sides[m.own], m.nodes)
-    contacts = ContactPoints(m.points, m.normals, m.areas, cells, held & still, m.gap)
+    contacts = ContactPoints(m.points, m.normals, m.areas, cells, own_held & other_held, m.gap)
     chart, frames, order = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
-    maps = [_map(m, i, mesh, held, frames, order) for i, mesh in enumerate(meshes)]
+    maps = [_map(m, i, mesh, own_held, frames, order) for i, mesh in enumerate(meshes)]
     areas, places, planes = m.areas[order], m.points[:, order], tuple(symmetry_planes(contacts))
     cells, carrier = renumbered(cells, order), SIDES[m.own]
     log.info("contact '%s': mortar, %d contacts on the %s body '%s'", pair.name, len(order), carrier, sides[m.own].name)
@@ -66,9 +66,7 @@ def _mesh(surface: Surface) -> Mesh:
 
 
 def _faces(name: str, mesh: Mesh) -> Faces:
-    return faces_of(
-        name, mesh.kind, mesh.degree, mesh.faces, mesh.outward, mesh.measure, mesh.locations, mesh.curve
-    )
+    return faces_of(name, mesh.kind, mesh.degree, mesh.faces, mesh.outward, mesh.measure, mesh.locations, mesh.curve)
 
 
 def _cells(side: Faces, nodes: np.ndarray) -> np.ndarray:

@@ -104,8 +104,8 @@ def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.nda
         slope = sum(c * V[normal + 1 + i] for i, c in enumerate(way))
         rows.append((sp.diags_array(factor * mu) @ slope - V[normal])[~smooth])
     A = sp.vstack(rows, format="csr")
-    still = [V[normal[fixed] + 1 + i] for i in range(d - 1)] if fixed.any() else []
-    equal = sp.vstack([sp.csr_array(s[None]), *still], format="csr")
+    rows_of_fixed = [V[normal[fixed] + 1 + i] for i in range(d - 1)] if fixed.any() else []
+    equal = sp.vstack([sp.csr_array(s[None]), *rows_of_fixed], format="csr")
     answer = linprog(  # z = z+ - z-
         np.ones(2 * len(s)),
         sp.hstack([A, -A], format="csr"),

@@ -4,8 +4,9 @@ Two yardsticks of the problem and of the answer make the certificate dimensionle
 d = Q r, w = q + V lambda and u = d + w, |.| the length of one contact's block and F0 the largest |r_i|:
 
     L = the largest of  min(1, |r_i| / (1e-6 F0)) |d_i|   (displacements that the forces make where they act),
-                        max(-w_n, 0)                      (overlaps that the forces must remove), and
-                        min |w_n|                         (the narrowest gap);
+                        max(-w_n, 0)                      (overlaps that the forces must remove),
+                        min |w_n|                         (the narrowest gap), and
+                        1e-6 min(1, |r_i| / (1e-6 F0)) |q_i|   (what rounding leaves of gaps that motions closed);
     F = min(F0, max(L / c, S)), at least 1e-5 max(L / c, S), with the mean compliance c = sum |r_i| c_i / sum |r_i| and
         the force on a plate S = max_j |s_j| / max_i |V_ij|; c_i is the mean of the diagonal of Q over block i.
 
@@ -46,6 +47,7 @@ from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
 
 ACTS = 1e-6  # share of the largest force from which on a contact's displacement counts fully in L
+ROUNDED = 1e-6  # share of a closed gap below which its remainder is rounding, where bodies move rigidly
 DUST = 1e-5  # share of the force that closes the gaps below which forces are rounding
 STIFFEST = 1e4  # largest rho_i, over the mean one
 
@@ -126,7 +128,10 @@ def yardsticks(problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.nd
     weight = np.minimum(1.0, size / (ACTS * largest)) if largest > 0 else np.zeros(len(r))
     overlap = np.where(problem.law.lowest < 0, np.abs(w[:, 0]), np.maximum(-w[:, 0], 0.0))
     length = max(
-        float(np.max(weight * np.linalg.norm(d, axis=1))), float(overlap.max()), float(np.min(np.abs(w[:, 0])))
+        float(np.max(weight * np.linalg.norm(d, axis=1))),
+        float(overlap.max()),
+        float(np.min(np.abs(w[:, 0]))),
+        ROUNDED * float(np.max(weight * np.linalg.norm(problem.q, axis=1))),
     )
     if length == 0:
         length = _least_displacement(r, d + w)

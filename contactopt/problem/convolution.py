@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from scipy.fft import fft, ifft, irfft, next_fast_len, rfft, rfftn
 
+from contactopt.problem.counter import Counter
 from contactopt.problem.operators import InterfaceOperator, check_dense
 
 SINGLE = 2e-6  # accuracy of products from which on single precision serves
@@ -203,10 +204,10 @@ def workers_for(padded: tuple[int, ...]) -> int:
 class Convolution(InterfaceOperator):
     """The interface operator of a kernel, in double precision, or in single precision where that is accurate enough."""
 
-    def __init__(self, kernel: Kernel, accuracy: float | None = None):
+    def __init__(self, kernel: Kernel, accuracy: float | None = None, counter: Counter | None = None):
         self.kernel = kernel
-        count = int(np.prod(kernel.grid))
-        super().__init__(self._product, np.tile(kernel.diagonal, count), kernel.entries, accuracy)
+        diagonal = np.tile(kernel.diagonal, int(np.prod(kernel.grid)))
+        super().__init__(self._product, diagonal, kernel.entries, accuracy, counter=counter)
 
     def _product(self, X: np.ndarray, accuracy: float | None) -> np.ndarray:
         every = tuple(range(self.kernel.dim))
@@ -218,12 +219,10 @@ class Convolution(InterfaceOperator):
             out[:, column] = np.moveaxis(moved, 0, -1).ravel()
         return out
 
-    def scaled(self, factor: float, added: np.ndarray) -> InterfaceOperator:
+    def scaled(self, factor: float, added: np.ndarray, counter: Counter | None = None) -> InterfaceOperator:
         if np.any(added):
-            return super().scaled(factor, added)
-        return Convolution(self.kernel.scaled(factor), self.accuracy)
+            return super().scaled(factor, added, counter)
+        return Convolution(self.kernel.scaled(factor), self.accuracy, counter)
 
     def loosened(self, accuracy: float) -> InterfaceOperator:
-        loose = Convolution(self.kernel, accuracy)
-        loose.count = self.count
-        return loose
+        return Convolution(self.kernel, accuracy, self.counter)

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.problem.counter import Counter
 from contactopt.problem.stacked import Stacked, in_turn
 
 Act = Callable[[np.ndarray], np.ndarray]
@@ -86,17 +87,18 @@ class CoupledForm:
     terms   of the bodies
     rest    r (n,) -> the part of Q r that needs no iteration: plates on supports, bodies with factors [length]
     factor  of the units of Q
-    count   number of applications of B so far, in a list that scaled forms share
+    counter counts the applications of B; scaled forms share it
     """
 
     terms: tuple[BodyTerm, ...]
     rest: Act
     factor: float = 1.0
-    count: list[int] = field(default_factory=lambda: [0])
+    counter: Counter = field(default_factory=Counter)
 
     @property
     def cycles(self) -> int:
-        return self.count[0]
+        """Number of applications of B so far."""
+        return self.counter.total
 
     def diagonal(self) -> Stacked:
         """The diagonal of A."""
@@ -112,7 +114,7 @@ class CoupledForm:
 
     def approximate(self, F: Stacked) -> Stacked:
         """B F, counted."""
-        self.count[0] += 1
+        self.counter.add()
         return Stacked(tuple(in_turn(lambda term, own: term.cycle(own) * self.factor, self.terms, F.parts)))
 
     def moved(self, X: Stacked, r: np.ndarray) -> np.ndarray:

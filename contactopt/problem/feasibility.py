@@ -25,7 +25,7 @@ from contactopt.problem.operators import InterfaceOperator, asymmetry
 from contactopt.problem.scaling import dimensionless
 
 DIRECTIONS = 16  # of the polygon in each cone, in 3D
-LARGEST = 3_000_000  # entries of the program up to which it is tried
+MOST_ENTRIES = 3_000_000  # entries of the program up to which it is tried
 EXACT = 1e-12  # relative size of what rounding leaves of a zero in the conditions on a ray
 MARGIN = 1e-7  # least -(q' e + s' z) of a ray of size one, over the size of its terms
 POLISH = 3  # least-squares steps
@@ -50,7 +50,7 @@ class Infeasible:
 def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasible | None:
     """A proof that the problem has no solution, or None: then it may have one or not.
 
-    Laws without a cone of forces, operators, and programs of more than LARGEST entries are not looked at. time_limit [s] bounds the
+    Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not looked at. time_limit [s] bounds the
     program. A positive definite Q without a plate needs none: every such problem has a solution.
     """
     if (
@@ -60,21 +60,21 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasi
     ):
         return None
     entries = problem.Q.nnz if sp.issparse(problem.Q) else problem.Q.size
-    if entries / problem.dim * (2 if problem.dim == 2 else DIRECTIONS) > LARGEST or _definite(problem):
+    if entries / problem.dim * (2 if problem.dim == 2 else DIRECTIONS) > MOST_ENTRIES or _definite(problem):
         return None
     scaled, scales = dimensionless(problem)
-    still = scaled.Q if sp.issparse(scaled.Q) else sp.csr_array(scaled.Q)
-    still = _without_ridge(problem, still)
-    ray = _program(scaled, still, time_limit)
+    Q = scaled.Q if sp.issparse(scaled.Q) else sp.csr_array(scaled.Q)
+    Q = _without_ridge(problem, Q)
+    ray = _program(scaled, Q, time_limit)
     if ray is None:
         return None
     for _ in range(POLISH):
-        if verified(scaled, still, *ray):
+        if verified(scaled, Q, *ray):
             weights, motions = ray
             margin = -float(scaled.q[:, 0] @ weights + scaled.s @ motions) * scales.force * scales.length
             told = _sentence(scaled, weights, motions)
             return Infeasible(weights, motions * scales.multipliers / scales.length, margin, told)
-        ray = _polished(scaled, still, *ray)
+        ray = _polished(scaled, Q, *ray)
     log.info("a ray that would prove the problem infeasible did not stand the check")
     return None
 

@@ -14,7 +14,6 @@ and of bodies without enough supports: lambda is how far each of them goes, s co
 from __future__ import annotations
 
 import hashlib
-import logging
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -31,10 +30,6 @@ from contactopt.problem.operators import Interface, InterfaceOperator, asymmetry
 from contactopt.problem.pairs import Pair
 
 SYMMETRIC = 1e-2  # largest |Q - Q'|, over the largest |Q|, that counts as rounding of the code that wrote Q
-
-logger = logging.getLogger(__name__)
-
-LARGEST_DENSE_BYTES = 8e9  # bytes of a Q that is formed in full from its products
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -134,7 +129,7 @@ class InterfaceProblem:
         pairs = self.pairs
         if len(pairs) < 2:  # the only pair is all of the problem, whatever was replaced in it
             pairs = (Pair(pairs[0].name if pairs else "contact", 0, k, self.chart),)
-        if [pair.first for pair in pairs] + [k] != [0] + [pair.last for pair in pairs]:
+        if [pair.start for pair in pairs] + [k] != [0] + [pair.stop for pair in pairs]:
             raise InputError(f"the pairs of surfaces must follow each other from contact 0 to contact {k - 1}.")
         object.__setattr__(self, "pairs", pairs)
         if self.motions and len(self.motions) != len(self.s):
@@ -177,17 +172,8 @@ class InterfaceProblem:
         return digest.hexdigest()[:16]
 
     def explicit(self) -> InterfaceProblem:
-        """The same problem with Q an array; InputError if that is larger than LARGEST_DENSE_BYTES bytes."""
-        if isinstance(self.Q, np.ndarray):
-            return self
-        size = 8 * self.q.size**2
-        if size > LARGEST_DENSE_BYTES:
-            raise InputError(
-                f"Q in full would take {size / 1e9:.1f} GB, more than the {LARGEST_DENSE_BYTES / 1e9:g} GB that are allowed; "
-                "use the method 'newton', or 'alternating' with the backend 'pcg', which need products with Q only."
-            )
-        logger.info("forming Q in full: %d unknowns, %.3g MB", self.q.size, size / 1e6)
-        return replace(self, Q=dense(self.Q))
+        """The same problem with Q an array; InputError if that would be too large (contactopt.problem.operators.MOST_BYTES)."""
+        return self if isinstance(self.Q, np.ndarray) else replace(self, Q=dense(self.Q))
 
     def displacements(self, reactions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """u = Q r + V lambda + q, (k, dim) [length]."""

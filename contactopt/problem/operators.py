@@ -17,6 +17,7 @@ from scipy.sparse.linalg import LinearOperator
 
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
+from contactopt.problem.counter import Counter
 from contactopt.problem.coupled import CoupledForm
 
 log = logging.getLogger(__name__)
@@ -25,9 +26,10 @@ FORMS = ("auto", "explicit", "implicit")  # of Q
 NOISE = 1e-13  # relative size of what rounding leaves of a zero
 FINEST = 1e-11  # accuracy of products that is not asked for more
 COLUMNS = 64  # unit vectors handed to the bodies at a time when the entries of Q are asked for
-NOTABLE = 2**28  # bytes of an array Q from which on its size is logged: a quarter of a gigabyte
-MOST = 2**34  # bytes of an array Q that is refused: 16 gigabytes
+NOTABLE_BYTES = 2**28  # bytes of an array Q from which on its size is logged: a quarter of a gigabyte
+MOST_BYTES = 8_000_000_000  # of an array Q; those who factorise it need another one or two of its size
 
+# (X (n,) or (n, j), relative accuracy or None for the best there is) -> the product with X, of its shape
 Product = Callable[[np.ndarray, float | None], np.ndarray]
 
 
@@ -38,10 +40,10 @@ class InterfaceOperator(LinearOperator):
     diagonal   (n,) diagonal of Q or an estimate of it, exactly 0 where a component cannot move
     entries    () -> Q (n, n) where there is a cheaper way to it than n products
     accuracy   relative, of the products; None: the best there is
-    held       (n,) mask of the components that cannot move
     inexact    whether a lower accuracy makes a product cheaper
     coupled    the same Q before condensation, where the bodies are solved by iteration; None elsewhere
-    products   number of columns multiplied so far
+    counter    counts the columns multiplied; by default one of its own. Operators made from another one share its counter
+    held       (n,) mask of the components that cannot move; by default those whose diagonal is 0
     """
 
     def __init__(
@@ -52,19 +54,22 @@ class InterfaceOperator(LinearOperator):
         accuracy: float | None = None,
         inexact: bool = False,
         coupled: CoupledForm | None = None,
+        counter: Counter | None = None,
+        held: np.ndarray | None = None,
     ):
         super().__init__(np.dtype(float), (len(diagonal), len(diagonal)))
         self.product, self.diagonal, self.entries = product, diagonal, entries
         self.accuracy, self.inexact, self.coupled = accuracy, inexact, coupled
-        self.held = self.diagonal == 0
-        self.count = [0]
+        self.held = self.diagonal == 0 if held is None else held
+        self.counter = counter or Counter()
 
     @property
     def products(self) -> int:
-        return self.count[0]
+        """Number of columns multiplied so far."""
+        return self.counter.total
 
     def _matmat(self, X: np.ndarray) -> np.ndarray:
-        self.count[0] += X.shape[1]
+        self.counter.add(X.shape[1])
         return np.asarray(self.product(X, self.accuracy))
 
     def _matvec(self, x: np.ndarray) -> np.ndarray:
@@ -89,8 +94,8 @@ class InterfaceOperator(LinearOperator):
             Q[:, first : first + unit.shape[1]] = self @ unit
         return np.asarray((Q + Q.T) / 2)
 
-    def scaled(self, factor: float, added: np.ndarray) -> InterfaceOperator:
-        """factor Q + diag(added), counting its own products."""
+    def scaled(self, factor: float, added: np.ndarray, counter: Counter | None = None) -> InterfaceOperator:
+        """factor Q + diag(added); its products are counted by `counter`, or by one of its own."""
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
             return factor * self.product(X, accuracy) + added[:, None] * X
@@ -99,15 +104,13 @@ class InterfaceOperator(LinearOperator):
         exact = None if entries is None else lambda: factor * entries() + np.diag(added)
         coupled = None if self.coupled is None else self.coupled.scaled(factor, added)
         diagonal = factor * self.diagonal + added
-        scaled = InterfaceOperator(product, diagonal, exact, self.accuracy, self.inexact, coupled)
-        scaled.held = self.held
-        return scaled
+        return InterfaceOperator(product, diagonal, exact, self.accuracy, self.inexact, coupled, counter, self.held)
 
     def loosened(self, accuracy: float) -> InterfaceOperator:
         """The same operator, its products no more accurate than that; both count together."""
-        loose = InterfaceOperator(self.product, self.diagonal, self.entries, accuracy, self.inexact, self.coupled)
-        loose.held, loose.count = self.held, self.count
-        return loose
+        return InterfaceOperator(
+            self.product, self.diagonal, self.entries, accuracy, self.inexact, self.coupled, self.counter, self.held
+        )
 
     def block(self, unknowns: np.ndarray) -> InterfaceOperator:
         """Q on some unknowns (m,) alone, e.g. its normal block (every dim-th) or an active set; both count together."""
@@ -120,9 +123,8 @@ class InterfaceOperator(LinearOperator):
 
         entries = self.entries
         exact = None if entries is None else lambda: entries()[np.ix_(unknowns, unknowns)]
-        part = InterfaceOperator(product, self.diagonal[unknowns], exact, self.accuracy, self.inexact)
-        part.held, part.count = self.held[unknowns], self.count
-        return part
+        diagonal, held = self.diagonal[unknowns], self.held[unknowns]
+        return InterfaceOperator(product, diagonal, exact, self.accuracy, self.inexact, None, self.counter, held)
 
 
 Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or InterfaceOperator
@@ -137,28 +139,31 @@ def sparse(Q: object) -> sp.csr_array:
 
 
 def check_dense(n: int) -> None:
-    """Before Q (n, n) is formed as an array: log its size if it is NOTABLE, and refuse it beyond MOST.
+    """Before Q (n, n) is formed as an array: log its size, as a warning from NOTABLE_BYTES on, and refuse it beyond MOST_BYTES.
 
     Raises
     ------
     InputError
-        With the size in bytes, if the array would take more than MOST.
+        With the size in bytes, if the array would take more than MOST_BYTES.
     """
     size = 8 * n**2
-    if size > MOST:
+    if size > MOST_BYTES:
         raise InputError(
-            f"Q as an array of {n} x {n} entries would take {size:,} bytes, more than {MOST:,}; take Q = 'implicit' and a "
+            f"Q as an array of {n} x {n} entries would take {size:,} bytes, more than {MOST_BYTES:,}; take Q = 'implicit' and a "
             "method that uses products with Q, such as newton, or fewer elements."
         )
-    if size >= NOTABLE:
-        log.warning("forming Q as an array of %d x %d entries: %s bytes", n, n, f"{size:,}")
+    level = logging.WARNING if size >= NOTABLE_BYTES else logging.INFO
+    log.log(level, "forming Q as an array of %d x %d entries: %s bytes", n, n, f"{size:,}")
 
 
 def dense(Q: Interface) -> np.ndarray:
-    """Q as an array (n, n)."""
+    """Q as an array (n, n); InputError if it would be larger than MOST_BYTES."""
     if isinstance(Q, InterfaceOperator):
         return Q.to_dense()
-    return np.asarray(Q.toarray()) if sp.issparse(Q) else Q
+    if not sp.issparse(Q):
+        return Q
+    check_dense(Q.shape[0])
+    return np.asarray(Q.toarray())
 
 
 def diagonal(Q: Interface) -> np.ndarray:
@@ -201,9 +206,7 @@ def shifted(Q: Interface, added: np.ndarray) -> Interface:
         return sp.csr_array(Q + sp.diags_array(added))
     if not isinstance(Q, InterfaceOperator):
         return Q + np.diag(added)
-    sum_ = Q.scaled(1.0, added)
-    sum_.count = Q.count
-    return sum_
+    return Q.scaled(1.0, added, Q.counter)
 
 
 def block(Q: Interface, unknowns: np.ndarray) -> Interface:

@@ -24,23 +24,23 @@ class Pair:
     """Consecutive contacts of an interface problem that belong to one pair of surfaces.
 
     name          of the pair, for messages, tables and files
-    first, last   numbers of its first contact and of the first one after it
+    start, stop   numbers of its first contact and of the first one after it
     chart         places of its contacts on their surface
     """
 
     name: str
-    first: int
-    last: int
+    start: int
+    stop: int
     chart: Chart
 
     @property
     def contacts(self) -> slice:
         """Of arrays with one row per contact."""
-        return slice(self.first, self.last)
+        return slice(self.start, self.stop)
 
     def unknowns(self, dim: int) -> np.ndarray:
         """Numbers of the pair's rows in Q."""
-        return np.arange(self.first * dim, self.last * dim)
+        return np.arange(self.start * dim, self.stop * dim)
 
 
 def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
@@ -52,12 +52,12 @@ def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
         problem,
         Q=block(problem.Q, rows),
         q=problem.q[own],
-        law=problem.law.select(np.arange(pair.first, pair.last)),
+        law=problem.law.select(np.arange(pair.start, pair.stop)),
         V=problem.V[rows],
         areas=problem.areas[own],
         coordinates=problem.coordinates[:, own],
         chart=pair.chart,
-        pairs=(Pair(pair.name, 0, pair.last - pair.first, pair.chart),),
+        pairs=(Pair(pair.name, 0, pair.stop - pair.start, pair.chart),),
     )
 
 

@@ -35,11 +35,15 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     makes that force zero instead of undetermined.
     """
     d = diagonal(problem.Q)
-    compliance = float(np.mean(d[d > 0])) if np.any(d > 0) else 1.0
     columns = np.linalg.norm(problem.V, axis=0)
     total = np.abs(problem.V).sum(axis=0)
     resultant = np.divide(np.abs(problem.s), total, out=np.zeros(len(problem.s)), where=total > 0)
-    force = float(resultant.max(initial=0.0)) or _closing(problem) / compliance or 1.0
+    balanced = float(resultant.max(initial=0.0))
+    if np.any(d > 0):
+        compliance = float(np.mean(d[d > 0]))
+    else:  # rigid bodies: only gaps have a length
+        compliance = (float(np.abs(problem.q).max(initial=0.0)) or 1.0) / (balanced or 1.0)
+    force = balanced or _closing(problem) / compliance or 1.0
     length = force * compliance
     columns = np.where(columns > 0, columns, 1.0)
     sizes = d if isinstance(problem.Q, InterfaceOperator) else row_sizes(problem.Q)

@@ -70,20 +70,21 @@ class Stacked:
         return sum(own() for own in sums)
 
 
-Vector: TypeAlias = np.ndarray | Stacked
+Vector: TypeAlias = Any  # an array (n,) or a Stacked
 
 
 def _started_dot(x: Any, y: Any) -> Callable[[], float]:
     """The scalar product of two parts; without BLAS, whose threads would spin until the next call."""
     if not _here(x):
-        return x.started_dot(y)  # type: ignore[no-any-return]
+        started: Callable[[], float] = x.started_dot(y)
+        return started
     made = float(np.einsum("i,i", x, y))
     return lambda: made
 
 
 def dot(x: Vector, y: Vector) -> float:
     """x' y."""
-    return x.dot(y) if isinstance(x, Stacked) else float(np.einsum("i,i", x, y))
+    return float(x.dot(y)) if isinstance(x, Stacked) else float(np.einsum("i,i", x, y))
 
 
 def norm(x: Vector) -> float:

@@ -14,7 +14,7 @@ from contactopt.scenes.toml_table import Table
 LENGTHS = {"nm": 1e-9, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
 SHAPES = ("mesh", "block", "ring", "disc")
 FAR = 1e6  # distance from the origin over the size of a body, beyond which rounding deforms its elements
-MOST = 2_000_000  # elements of a structured body
+MOST_ELEMENTS = 2_000_000  # elements of a structured body
 
 
 def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], length: str) -> Any:
@@ -78,8 +78,13 @@ def _grid(table: Table, key: str, what: str) -> tuple[float, float]:
 
 def _counts(table: Table, names: tuple[str, ...]) -> list[int]:
     counts = table.numbers("elements", len(names), f"the numbers of elements [{', '.join(names)}]")
-    if not all(isinstance(count, int) and count >= 1 for count in counts) or np.prod(counts, dtype=float) > MOST:
-        raise table.fail(f"'elements' must be whole numbers of at least 1, at most {MOST} elements in all.", "elements")
+    if (
+        not all(isinstance(count, int) and count >= 1 for count in counts)
+        or np.prod(counts, dtype=float) > MOST_ELEMENTS
+    ):
+        raise table.fail(
+            f"'elements' must be whole numbers of at least 1, at most {MOST_ELEMENTS} elements in all.", "elements"
+        )
     return [int(count) for count in counts]
 
 

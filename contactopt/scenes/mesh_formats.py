@@ -21,7 +21,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 
-LARGEST = 4_000_000_000  # bytes: a larger file holds more than can be solved
+MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
 # arrays of integers per element whose numbers are groups; those of others are named 'array=number'
 TAGS = (
     "gmsh:physical",
@@ -109,8 +109,8 @@ def _read(path: Path) -> Any:
         what = "is a folder" if path.is_dir() else "is no file that can be read" if path.exists() else "does not exist"
         raise InputError(f"mesh file '{path}' {what}.")
     size = path.stat().st_size
-    if not 0 < size < LARGEST:
-        raise InputError(f"mesh file '{path}' has {size} bytes; a mesh that can be solved has 1 to {LARGEST:.0e}.")
+    if not 0 < size < MOST_BYTES:
+        raise InputError(f"mesh file '{path}' has {size} bytes; a mesh that can be solved has 1 to {MOST_BYTES:.0e}.")
     endings = ["".join(path.suffixes[-n:]).lower() for n in range(len(path.suffixes), 0, -1)]
     formats = [name for ending in endings for name in meshio.extension_to_filetypes.get(ending, ())]
     if not formats:

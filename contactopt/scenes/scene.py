@@ -17,8 +17,8 @@ from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.scenes.contact import Contact
 
-MOST_ELEMENTS = 100_000  # across the contact half-width
-LARGEST = 1e100  # of forces, stresses and lengths: the squares of larger ones are no numbers
+MOST_ACROSS = 100_000  # across the contact half-width
+LARGEST_VALUE = 1e100  # of forces, stresses and lengths: the squares of larger ones are no numbers
 
 # The components of a displacement, in the order of the mesh coordinates.
 COMPONENTS = {"plane-strain": ("x", "y"), "axisymmetric": ("r", "z"), "solid": ("x", "y", "z")}
@@ -252,8 +252,8 @@ class Scene:
         for name, count in (("elements", self.elements), ("copies", self.copies)):
             if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
                 raise InputError(f"scene '{self.name}': {name} must be a whole number of at least 1; got {count!r}.")
-        if self.elements > MOST_ELEMENTS:
-            raise InputError(f"scene '{self.name}': elements must be at most {MOST_ELEMENTS}; got {self.elements}.")
+        if self.elements > MOST_ACROSS:
+            raise InputError(f"scene '{self.name}': elements must be at most {MOST_ACROSS}; got {self.elements}.")
         if isinstance(self.degree, bool) or not isinstance(self.degree, int) or self.degree not in (1, 2):
             raise InputError(
                 f"scene '{self.name}': the degree of the displacement must be 1 or 2; got {self.degree!r}."
@@ -393,7 +393,9 @@ class Scene:
                 )
             else:
                 for value in load.value:
-                    check_number(f"every {type(load).__name__} value of body '{part.name}'", value, -LARGEST, LARGEST)
+                    check_number(
+                        f"every {type(load).__name__} value of body '{part.name}'", value, -LARGEST_VALUE, LARGEST_VALUE
+                    )
 
     def _check_components(self, body: str, values: Mapping[str, float]) -> None:
         if not isinstance(values, Mapping):
@@ -403,4 +405,4 @@ class Scene:
                 raise InputError(
                     f"body '{body}': there is no component {component!r}; use {', '.join(self.components)}."
                 )
-            check_number(f"the {component} value of body '{body}'", value, -LARGEST, LARGEST)
+            check_number(f"the {component} value of body '{body}'", value, -LARGEST_VALUE, LARGEST_VALUE)

@@ -60,8 +60,9 @@ def sliced(scene: Scene, name: str, count: int, axis: int = -1) -> Scene:
         for i in range(1, count)
     )
     bodies = [own for other in scene.parts for own in (slices if other is part else (other,))]
-    whole = {"upper": None, "lower": None, "mu": None, "law": "coulomb"}
-    return replace(scene, **whole, bodies=tuple(bodies), contacts=(*pairs, *ties))
+    return replace(
+        scene, upper=None, lower=None, mu=None, law="coulomb", bodies=tuple(bodies), contacts=(*pairs, *ties)
+    )
 
 
 def _home(body: str, boundary: str, meshes: list[Any]) -> int:
@@ -79,10 +80,13 @@ def _sliced_part(part: Part, count: int, axis: int, number: int, mesh: Any) -> P
     def there(item: Any) -> bool:
         return isinstance(item, BodyForce) or len(mesh.boundaries.get(item.boundary, ())) > 0
 
-    supports, loads = (tuple(item for item in items if there(item)) for items in (part.supports, part.loads))
+    supports = tuple(item for item in part.supports if there(item))
+    loads = tuple(item for item in part.loads if there(item))
     name = f"{part.name}-{number + 1}"
     contact = part.contact if len(mesh.boundaries.get(part.contact, ())) else f"cut {max(number, 1)}"
-    return replace(part, name=name, mesh=_slice(part, count, axis, number), supports=supports, loads=loads, contact=contact)
+    return replace(
+        part, name=name, mesh=_slice(part, count, axis, number), supports=supports, loads=loads, contact=contact
+    )
 
 
 def _slice(part: Part, count: int, axis: int, number: int) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 from contactopt.checks import check_number, short
 from contactopt.errors import InputError
 
-LARGEST = 1_000_000  # bytes of a file that people write
+MOST_BYTES = 1_000_000  # bytes of a file that people write
 TOKEN = re.compile(
     r"""(?P<space>[ \t\r\n]+|\#[^\n]*)
     |(?P<text>\"{3}(?:\\[\s\S]|(?!\"{3})[^\\])*\"{3,5}|'{3}(?:(?!'{3})[\s\S])*'{3,5}|"(?:\\.|[^"\\\n])*"|'[^'\n]*')
@@ -121,8 +121,10 @@ def read_table(path: Path) -> Table:
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "is no file that can be read" if path.exists() else "does not exist"
         raise InputError(f"scene file '{path}' {what}.")
-    if path.stat().st_size > LARGEST:
-        raise InputError(f"scene file '{path}' has more than {LARGEST} bytes; meshes belong into files of their own.")
+    if path.stat().st_size > MOST_BYTES:
+        raise InputError(
+            f"scene file '{path}' has more than {MOST_BYTES} bytes; meshes belong into files of their own."
+        )
     try:
         text = path.read_bytes().decode().replace("\r\n", "\n")
         return Table(path.name, lines_of(text) if tomllib.loads(text) else {}, tomllib.loads(text))

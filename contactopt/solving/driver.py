@@ -23,7 +23,7 @@ from contactopt.problem import (
 )
 from contactopt.problem.balance import escape, sentence
 from contactopt.problem.certificate import Moved
-from contactopt.problem.operators import InterfaceOperator, loosened
+from contactopt.problem.operators import InterfaceOperator, diagonal, loosened
 from contactopt.solving.deadline import TimeUp, until
 from contactopt.solving.methods import Iterate, Known, Method, default_method, find_method, solvers_of, solves
 from contactopt.solving.notes import collected
@@ -223,6 +223,7 @@ class _Recorder:
         self.recent: list[np.ndarray] = [np.zeros(problem.q.size + len(problem.s))]
         self.clock, self.certified = 0.0, 0.0
         self.repeated = 0
+        self.lengthless = not np.any(diagonal(problem.Q)) and not np.any(problem.q)
 
     def _certificate(self, known: Sequence[Moved]) -> float:
         """The natural-map residual, by Q r from the method where it is known.
@@ -243,6 +244,10 @@ class _Recorder:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
         r, lam, *known = iterate
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)
+        if (
+            self.lengthless
+        ):  # the same forces solve the problem with u = V lambda = 0, and rounding has no size to vanish beside
+            self.multipliers = np.zeros(len(lam))
         begin = time.perf_counter()
         self.residual = self._certificate(known)
         self.certified += time.perf_counter() - begin

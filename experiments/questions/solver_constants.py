@@ -68,7 +68,7 @@ def orders() -> list[dict[str, Any]]:
     rows = []
     for name, (scene, part, elements) in ORDERED.items():
         asked = system(scene, part, elements)
-        for form, last in (("implicit", np.zeros(0, int)), ("explicit", asked.last)):
+        for form, last in (("implicit", np.zeros(0, int)), ("explicit", asked.trailing)):
             for order in ("minimum degree", "nested dissection"):
                 act = partial(elimination_order, *asked[:4], last, order == "minimum degree")
                 chosen = act()
@@ -115,7 +115,7 @@ def precisions(asked: System) -> list[dict[str, Any]]:
 def cost(asked: System) -> dict[str, Any]:
     """Set-up, one V-cycle, and one solve for a random load on the contact."""
     load = np.zeros(asked.A.shape[0])
-    load[asked.last] = np.random.default_rng(0).standard_normal(len(asked.last))
+    load[asked.trailing] = np.random.default_rng(0).standard_normal(len(asked.trailing))
     start = time.process_time()
     solver = multigrid.MultigridSolver(asked)
     setup = time.process_time() - start

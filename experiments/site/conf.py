@@ -20,7 +20,15 @@ copyright = author
 version = release = contactopt.__version__
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx-mathjax-offline"]
-exclude_patterns = ["*.py", "notes", "accuracy.md", "performance.md", "**/__pycache__"]
+exclude_patterns = [
+    "*.py",
+    "notes",
+    "accuracy.md",
+    "performance.md",
+    "course.md",
+    "generated/notebooks",
+    "**/__pycache__",
+]
 html_theme, html_title = "furo", f"contactopt {version}"
 html_static_path, html_css_files = ["_static"], ["site.css"]
 html_show_sourcelink, html_copy_source = False, False
@@ -29,6 +37,7 @@ myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 3
 nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
 nb_execution_mode, nb_execution_timeout = "force", 180
+nb_execution_excludepatterns = ["**/solutions_*"]  # a second run of the chapters; the tests execute the solutions
 nb_execution_raise_on_error, nb_execution_in_temp, nb_merge_streams = True, True, True
 
 autodoc_member_order, autodoc_typehints = "bysource", "signature"

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
+import jupytext
 import reference
 from reference import contents, index
 
@@ -64,8 +65,9 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     found = {path.stem: path for path in (ROOT / "experiments" / "tutorials").glob("*.py")}
     ordered = [name for name in TUTORIALS if name in found] + sorted(set(found) - set(TUTORIALS))
     for name in ordered:
-        yield Path("tutorials", f"{name}.py"), found[name]
+        yield from notebook("tutorials", name, found[name].read_text())
     yield Path("tutorials.md"), index("Tutorials", TUTORIAL_TEXT, [f"tutorials/{name}" for name in ordered])
+    yield from course(site)
     yield from reference.plug_in_pages(site)
     yield Path("command_line.md"), command_line()
     yield from reference.room_pages(ROOT)
@@ -82,9 +84,35 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
                 yield Path("reports", base(path), picture[1]), path.parent / picture[1]
 
 
-TUTORIAL_TEXT = """Each tutorial is a script, a notebook (open the file in Jupyter with jupytext, or in VS Code) and a page of
-this site. It takes about ten minutes to read. Every claim is asserted in its code, and the exercises have hidden solutions.
+TUTORIAL_TEXT = """Each tutorial is a script, a notebook to download, and a page of this site. It takes about ten minutes to read.
+Every claim is asserted in its code, and the exercises have hidden solutions. [The course](course.md) says how to open a notebook.
 """
+
+
+def notebook(folder: str, name: str, text: str) -> Iterator[tuple[Path, str]]:
+    """A percent script as a page that offers the notebook, and the notebook."""
+    title, rest = text.split("\n", 2)[1], text.split("\n", 2)[2]
+    offer = f"#\n# {{download}}`Download this page as a notebook <../notebooks/{name}.ipynb>`"
+    yield Path(folder, f"{name}.py"), f"# %% [markdown]\n{title}\n{offer}\n{rest}"
+    local = re.sub(r"\]\((\w+)\.py\)", r"](\1.ipynb)", text)  # notebooks of one folder refer to each other
+    yield Path("notebooks", f"{name}.ipynb"), jupytext.writes(jupytext.reads(local, "py:percent"), "ipynb")
+
+
+def course(site: Path) -> Iterator[tuple[Path, str]]:
+    """Each chapter twice: with exercises to answer, and with their solutions."""
+    chapters = {path.stem: path.read_text() for path in sorted((ROOT / "experiments" / "course").glob("chapter_*.py"))}
+    for name, text in chapters.items():
+        yield from notebook("course", name, without_cells(text, "solution"))
+        solved = re.sub(r"^# # (Chapter \d)", r"# # Solutions: \1", without_cells(text, "exercise"), flags=re.M)
+        yield from notebook("course", f"solutions_{name}", solved)
+    pages = [f"course/{name}" for name in chapters] + [f"course/solutions_{name}" for name in chapters]
+    yield Path("course.md"), (site / "course.md").read_text() + contents(pages, hidden=False)
+
+
+def without_cells(text: str, tag: str) -> str:
+    """A percent script without the cells that have this tag."""
+    cells = re.split(r"^(?=# %%)", text, flags=re.M)
+    return "".join(cell for cell in cells if cell and f'tags=["{tag}"]' not in cell.splitlines()[0])
 
 
 def command_line() -> str:

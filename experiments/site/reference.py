@@ -36,6 +36,7 @@ ROOMS = {
     "solving": "The driver, the methods, and what methods are built from. Nothing here knows finite elements.",
     "scenes": "A scene says what is modelled: bodies, materials, supports and loads. The named scenes are here too.",
     "models": "The convex programs of the subject are written in cvxpy, as on a blackboard.",
+    "teaching": "What the notebooks of the course share: exercises that grade themselves, and sliders.",
     "fclib": "Problems are exchanged with the FCLib collection.",
     "analytic": "Exact solutions, against which the computed ones are held.",
     "problem": "The interface problem, its solution and its certificate: optimisation only.",

@@ -262,3 +262,6 @@ assert history["energy_error"].max() < 1e-9
 # ```
 #
 # </details>
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script

@@ -282,3 +282,6 @@ assert (ratio["auto"] < np.inf).mean() > (ratio["guess_and_sort"] < np.inf).mean
 # ```
 #
 # </details>
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script

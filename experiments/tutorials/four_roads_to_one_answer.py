@@ -200,3 +200,6 @@ assert natural_map_residual(problem, r, answers["newton"].multipliers) < 1e-12
 # ```
 #
 # </details>
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script

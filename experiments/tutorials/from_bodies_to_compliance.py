@@ -267,3 +267,6 @@ assert np.all((growth > 1.9) & (growth < 2.1))
 # ```
 #
 # </details>
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script

@@ -175,3 +175,6 @@ assert abs(approach[-1] - 1) < 0.05
 # It yields below the surface, at about half a contact radius, where nobody sees it.
 #
 # </details>
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script

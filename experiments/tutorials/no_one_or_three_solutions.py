@@ -307,3 +307,6 @@ assert len(all_solutions(piston(2.0, give=1e-2))) == 1
 # ```
 #
 # </details>
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script

@@ -402,3 +402,6 @@ Slider(rows, start=25)
 # </details>
 #
 # Next: [where Q comes from](from_bodies_to_compliance.py).
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script

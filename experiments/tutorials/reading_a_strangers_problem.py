@@ -227,3 +227,6 @@ folder.cleanup()
 # ```
 #
 # </details>
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script

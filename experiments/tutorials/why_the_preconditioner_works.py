@@ -262,3 +262,6 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(motion[:
 # ```
 #
 # </details>
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script

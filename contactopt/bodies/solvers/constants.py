@@ -19,4 +19,4 @@ DEGREE = 3  # products with A in the smoother, which is a polynomial of this deg
 
 # Limits, not fitted.
 RTOL = 1e-10  # accuracy of an iterative solve when none is asked for
-MOST = 300  # conjugate gradient iterations before a solve is given up
+MOST_ITERATIONS = 300  # conjugate gradient iterations before a solve is given up

@@ -22,11 +22,10 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST, NEAR, RTOL
+from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST_ITERATIONS, NEAR, RTOL
 from contactopt.bodies.solvers.products import SparseProduct
 from contactopt.bodies.solvers.system import (
     Iteration,
-    Product,
     System,
     asked,
     block_product,
@@ -34,6 +33,7 @@ from contactopt.bodies.solvers.system import (
 )
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
+from contactopt.problem.operators import Product
 
 SINGLE = np.float32
 PIECES = 16  # in which the rows of a matrix are brought into blocks
@@ -54,13 +54,13 @@ class MultigridSolver:
     releases_lock = True
 
     def __init__(self, system: System):
-        self.last, self.n = system.last, system.A.shape[0]
+        self.trailing, self.n = system.trailing, system.A.shape[0]
         self.A = SparseProduct(system.A)
         self.cycle = VCycle(*system[:4])
 
     @property
     def complete(self) -> bool:
-        return self.last is not None
+        return self.trailing is not None
 
     @property
     def iteration(self) -> Iteration:
@@ -75,10 +75,10 @@ class MultigridSolver:
         return out
 
     def trailing_inverse(self) -> np.ndarray:
-        return inverse_block(self, asked(self.last), self.n)
+        return inverse_block(self, asked(self.trailing), self.n)
 
     def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        return block_product(self, asked(self.last), self.n, load, rtol)
+        return block_product(self, asked(self.trailing), self.n, load, rtol)
 
     def restricted(self, at: np.ndarray) -> Product:
         return lambda load, rtol: block_product(self, at, self.n, load, rtol)
@@ -182,11 +182,11 @@ def conjugate_gradients(A: SparseProduct, cycle: VCycle, load: np.ndarray, rtol:
 
     Raises
     ------
-    BackendError : if it does not get there within MOST iterations, or r' B r is negative or not a number.
+    BackendError : if it does not get there within MOST_ITERATIONS iterations, or r' B r is negative or not a number.
     """
     r = np.array(load, dtype=float)
     x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
-    for step in range(MOST + 1):
+    for step in range(MOST_ITERATIONS + 1):
         z = cycle.apply(r)
         size, previous = _dot(r, z), size
         goal = rtol**2 * size if goal is None else goal
@@ -199,7 +199,7 @@ def conjugate_gradients(A: SparseProduct, cycle: VCycle, load: np.ndarray, rtol:
         alpha = size / _dot(p, Ap)
         x += alpha * p
         r -= alpha * Ap
-    raise BackendError(f"multigrid: the error was not reduced by {rtol:g} within {MOST} iterations.")
+    raise BackendError(f"multigrid: the error was not reduced by {rtol:g} within {MOST_ITERATIONS} iterations.")
 
 
 def _dot(x: np.ndarray, y: np.ndarray) -> float:

@@ -22,7 +22,7 @@ def elimination_order(
     node: np.ndarray,
     component: np.ndarray,
     points: np.ndarray,
-    last: np.ndarray,
+    trailing: np.ndarray,
     by_degree: bool | None = None,
 ) -> np.ndarray:
     """Order of elimination with few entries in the factors and some unknowns at the end.
@@ -32,17 +32,17 @@ def elimination_order(
     A : (n, n) symmetric sparse matrix, of which only the pattern counts
     node, component : (n,) mesh node of each unknown, and its component of the displacement
     points : (dim, nodes) coordinates of the mesh nodes [length]
-    last : (m,) unknowns to be eliminated last; may be empty
+    trailing : (m,) unknowns to be eliminated last; may be empty
     by_degree : minimum degree rather than nested dissection; None: in the plane
 
     Returns
     -------
-    (n,) permutation of the unknowns. The unknowns of a node follow each other. `last` is at the end, in its own order.
+    (n,) permutation of the unknowns. The unknowns of a node follow each other. `trailing` is at the end, in its own order.
     """
     present, own = np.unique(node, return_inverse=True)
     graph = _node_graph(A, own, len(present))
-    kept = np.zeros(len(present), dtype=bool)  # nodes with an unknown in `last`
-    kept[own[last]] = True
+    kept = np.zeros(len(present), dtype=bool)  # nodes with an unknown in `trailing`
+    kept[own[trailing]] = True
     rank = np.full(len(present), len(present))
     if len(points) == 2 if by_degree is None else by_degree:
         rank[minimum_degree(graph + _clique(kept))] = np.arange(len(present))
@@ -51,8 +51,8 @@ def elimination_order(
         rank[inside[nested_dissection(graph[inside][:, inside], points[:, present[inside]])]] = np.arange(len(inside))
     order = np.lexsort((component, rank[own]))
     final = np.zeros(len(own), dtype=bool)
-    final[last] = True
-    return np.concatenate([order[~final[order]], last])
+    final[trailing] = True
+    return np.concatenate([order[~final[order]], trailing])
 
 
 def minimum_degree(graph: sp.csr_matrix) -> np.ndarray:

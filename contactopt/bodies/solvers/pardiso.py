@@ -10,7 +10,6 @@ import scipy.sparse as sp
 
 from contactopt.bodies.solvers.mkl import library
 from contactopt.bodies.solvers.system import (
-    Product,
     System,
     asked,
     block_product,
@@ -18,6 +17,7 @@ from contactopt.bodies.solvers.system import (
     triangle_product,
 )
 from contactopt.errors import InputError
+from contactopt.problem.operators import Product
 
 
 class PardisoSolver:
@@ -34,7 +34,7 @@ class PardisoSolver:
         except ImportError as error:
             raise InputError("the body solver 'pardiso' needs the package pypardiso: pip install pypardiso.") from error
         library()  # so that pypardiso need not search for it
-        self.last = system.last
+        self.trailing = system.trailing
         self.upper = sp.triu(system.A, format="csr")
         self.factors = PyPardisoSolver(mtype=2)  # real, symmetric positive definite
         self.factors.factorize(self.upper)
@@ -42,7 +42,7 @@ class PardisoSolver:
 
     @property
     def complete(self) -> bool:
-        return self.last is not None
+        return self.trailing is not None
 
     def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         if not load.size:
@@ -51,23 +51,25 @@ class PardisoSolver:
 
     @cached_property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray]:
-        """R (m, m) lower triangular and the place (m,) of each of `last`: R R' is the Schur complement in these places.
+        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur complement in these places.
 
         A second factorisation, which stops before these unknowns, leaves the Schur complement.
         """
         from pypardiso import PyPardisoSolver
 
-        last, n = asked(self.last), self.upper.shape[0]
-        if not len(last):
+        trailing, n = asked(self.trailing), self.upper.shape[0]
+        if not len(trailing):
             return np.zeros((0, 0)), np.zeros(0, int)
         partial = PyPardisoSolver(mtype=2, phase=12)
         for index, value in {1: 1, 2: 2, 10: 13, 21: 1, 36: 1}.items():  # own values; METIS; defaults; Schur complement
             partial.set_iparm(index, value)
         partial.perm = np.zeros(n, dtype=np.int32)
-        partial.perm[last] = 1
-        S = partial._call_pardiso(self.upper, np.zeros((len(last), len(last))))  # in the order of sorted unknowns
+        partial.perm[trailing] = 1
+        S = partial._call_pardiso(
+            self.upper, np.zeros((len(trailing), len(trailing)))
+        )  # in the order of sorted unknowns
         partial.free_memory(everything=True)
-        return np.linalg.cholesky(S), np.argsort(np.argsort(last))
+        return np.linalg.cholesky(S), np.argsort(np.argsort(trailing))
 
     def trailing_inverse(self) -> np.ndarray:
         return triangle_inverse(*self.trailing_triangle)

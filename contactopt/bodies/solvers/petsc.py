@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.bodies.solvers.constants import MOST, RTOL
+from contactopt.bodies.solvers.constants import MOST_ITERATIONS, RTOL
 from contactopt.bodies.solvers.multigrid import nodal_blocks, rigid_motions
-from contactopt.bodies.solvers.system import Iteration, Product, System, asked, block_product, inverse_block
+from contactopt.bodies.solvers.system import Iteration, System, asked, block_product, inverse_block
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
+from contactopt.problem.operators import Product
 
 ALONE = threading.RLock()  # PETSc does not allow calls from two threads at the same time
 
@@ -37,7 +38,7 @@ class PetscSolver:
 
     def __init__(self, system: System):
         petsc, dim = library(), len(system.points)
-        self.last, self.n = system.last, system.A.shape[0]
+        self.trailing, self.n = system.trailing, system.A.shape[0]
         blocks, self.place, present = nodal_blocks(system.A, system.node, system.component, dim)
         modes = rigid_motions(system.points[:, present])
         modes[np.setdiff1d(np.arange(len(modes)), self.place)] = 0.0
@@ -46,7 +47,9 @@ class PetscSolver:
             here, indices = petsc.COMM_SELF, petsc.IntType
             rows = A.indptr.astype(indices), A.indices.astype(indices), A.data
             self.A = petsc.Mat().createAIJ(A.shape, bsize=dim, csr=rows, comm=here)
-            vectors = [petsc.Vec().createWithArray(column.copy(), bsize=dim, comm=here) for column in np.linalg.qr(modes)[0].T]
+            vectors = [
+                petsc.Vec().createWithArray(column.copy(), bsize=dim, comm=here) for column in np.linalg.qr(modes)[0].T
+            ]
             self.A.setNearNullSpace(petsc.NullSpace().create(vectors=vectors, comm=here))
             self.A.setOption(petsc.Mat.Option.SPD, True)
             self.ksp = petsc.KSP().create(here)
@@ -60,7 +63,7 @@ class PetscSolver:
 
     @property
     def complete(self) -> bool:
-        return self.last is not None
+        return self.trailing is not None
 
     @property
     def iteration(self) -> Iteration:
@@ -75,10 +78,10 @@ class PetscSolver:
         return out
 
     def trailing_inverse(self) -> np.ndarray:
-        return inverse_block(self, asked(self.last), self.n)
+        return inverse_block(self, asked(self.trailing), self.n)
 
     def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        return block_product(self, asked(self.last), self.n, load, rtol)
+        return block_product(self, asked(self.trailing), self.n, load, rtol)
 
     def restricted(self, at: np.ndarray) -> Product:
         return lambda load, rtol: block_product(self, at, self.n, load, rtol)
@@ -87,10 +90,10 @@ class PetscSolver:
         if not b.any():
             return np.zeros(self.n)
         with ALONE:
-            self.ksp.setTolerances(rtol=rtol, atol=0.0, max_it=MOST)
+            self.ksp.setTolerances(rtol=rtol, atol=0.0, max_it=MOST_ITERATIONS)
             x = self._acting(self.ksp.solve)(b)
             if self.ksp.getConvergedReason() < 0:
-                raise BackendError(f"petsc: the error was not reduced by {rtol:g} within {MOST} iterations.")
+                raise BackendError(f"petsc: the error was not reduced by {rtol:g} within {MOST_ITERATIONS} iterations.")
             return x
 
     def _acting(self, act: Any) -> Any:

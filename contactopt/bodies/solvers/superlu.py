@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import weakref
+from _thread import start_new_thread
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
@@ -13,7 +15,6 @@ from scipy.sparse.linalg import splu
 
 from contactopt.bodies.solvers.ordering import elimination_order
 from contactopt.bodies.solvers.system import (
-    Product,
     System,
     asked,
     block_product,
@@ -21,18 +22,21 @@ from contactopt.bodies.solvers.system import (
     triangle_inverse,
     triangle_product,
 )
+from contactopt.problem.operators import Product
 
 
 class FactorThread:
     """One thread that makes factors and frees them: SuperLU returns memory only in the thread that took it.
 
-    The thread ends, and its factors are freed, when nobody refers to this object any more.
+    The thread ends, and its factors are freed, when nobody refers to this object any more. Python may find that out
+    in the middle of any other operation of any thread, one that holds the locks of another pool, say. The thread is
+    therefore told by a thread of a moment's life, which may wait for these locks.
     """
 
     def __init__(self) -> None:
         self._executor = ThreadPoolExecutor(1, thread_name_prefix="superlu")
         self._held: list[Any] = []
-        weakref.finalize(self, _free, self._executor, self._held).atexit = False
+        weakref.finalize(self, start_new_thread, _free, (self._executor, self._held)).atexit = False
 
     def factorise(self, A: sp.csc_matrix) -> int:
         """Factorise A without a change of order and return the number under which [] finds the factors."""
@@ -45,7 +49,8 @@ class FactorThread:
 
 
 def _free(executor: ThreadPoolExecutor, held: list[Any]) -> None:
-    executor.submit(held.clear)
+    with suppress(RuntimeError):  # Python is ending: there is nothing left to free
+        executor.submit(held.clear)
     executor.shutdown(wait=False)
 
 
@@ -55,7 +60,7 @@ def factorise(A: sp.csc_matrix) -> Any:
 
 
 class SuperLUSolver:
-    """Factors L U = L D L' of A, with `last` eliminated last: their last rows and columns give its Schur complement."""
+    """Factors L U = L D L' of A, with `trailing` eliminated last: their last rows and columns give its Schur complement."""
 
     name = "superlu"
     iterative = False
@@ -63,15 +68,15 @@ class SuperLUSolver:
     releases_lock = False
 
     def __init__(self, system: System):
-        self.last, self._plane = system.last, len(system.points) == 2
-        last = np.zeros(0, int) if system.last is None else system.last
-        self._order = elimination_order(*system[:4], last)
+        self.trailing, self._plane = system.trailing, len(system.points) == 2
+        trailing = np.zeros(0, int) if system.trailing is None else system.trailing
+        self._order = elimination_order(*system[:4], trailing)
         self._thread = FactorThread()
         self._thread.factorise(system.A[self._order][:, self._order].tocsc())
 
     @property
     def complete(self) -> bool:
-        return self.last is not None
+        return self.trailing is not None
 
     @property
     def factors(self) -> Any:
@@ -86,11 +91,11 @@ class SuperLUSolver:
 
     @cached_property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """R (m, m) lower triangular and the place (m,) of each of `last`: R R' is the Schur complement in these places.
+        """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur complement in these places.
 
         None where SuperLU changed the order for its pivots.
         """
-        factors, m = self.factors, len(asked(self.last))
+        factors, m = self.factors, len(asked(self.trailing))
         n = factors.shape[0]
         head = n - m
         symmetric = np.array_equal(factors.perm_c, factors.perm_r)
@@ -101,13 +106,13 @@ class SuperLUSolver:
 
     def trailing_inverse(self) -> np.ndarray:
         if self.trailing_triangle is None:
-            return inverse_block(self, asked(self.last), len(self._order))
+            return inverse_block(self, asked(self.trailing), len(self._order))
         return triangle_inverse(*self.trailing_triangle)
 
     def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         """Two triangular solves with the trailing triangle: nothing of the interior is touched."""
         if self.trailing_triangle is None:
-            return block_product(self, asked(self.last), len(self._order), load, rtol)
+            return block_product(self, asked(self.trailing), len(self._order), load, rtol)
         return triangle_product(*self.trailing_triangle, load)
 
     def restricted(self, at: np.ndarray) -> Product:

@@ -10,6 +10,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from contactopt.errors import InputError
+from contactopt.problem.operators import Product
 
 
 class System(NamedTuple):
@@ -18,17 +19,14 @@ class System(NamedTuple):
     A          (n, n) stiffness on the free displacement unknowns, symmetric positive definite [force / length]
     node       (n,) mesh node of each unknown;   component  (n,) its component, 0 .. dim - 1
     points     (dim, nodes) coordinates of the mesh nodes [length]
-    last       (m,) unknowns whose block of the inverse is asked for (the contact unknowns), or None
+    trailing   (m,) unknowns whose block of the inverse is asked for (the contact unknowns), or None
     """
 
     A: sp.csr_matrix
     node: np.ndarray
     component: np.ndarray
     points: np.ndarray
-    last: np.ndarray | None = None
-
-
-Product = Callable[[np.ndarray, float | None], np.ndarray]
+    trailing: np.ndarray | None = None
 
 
 class Iteration(NamedTuple):
@@ -49,7 +47,7 @@ class BodySolver(Protocol):
     iterative      whether a lower accuracy costs less; the others ignore `rtol` and solve to rounding
     releases_lock  whether a solve leaves Python's lock to other threads, so that two solvers at once are faster than
                    one after the other
-    complete       whether the block of the inverse on System.last was provided for
+    complete       whether the block of the inverse on System.trailing was provided for
     iteration      what it repeats, for those who iterate on several bodies at once; None for a solver with factors
     """
 
@@ -78,7 +76,7 @@ class BodySolver(Protocol):
         """
 
     def trailing_inverse(self) -> np.ndarray:
-        """(m, m) symmetric block of the inverse of A on the unknowns `last`; InputError if it is not complete."""
+        """(m, m) symmetric block of the inverse of A on the unknowns `trailing`; InputError if it is not complete."""
 
     def trailing_product(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
         """That block times `load`, which is (m,) or (m, j)."""
@@ -90,11 +88,11 @@ class BodySolver(Protocol):
         """
 
 
-def asked(last: np.ndarray | None) -> np.ndarray:
-    """`last`; InputError if it is None."""
-    if last is None:
-        raise InputError("no unknowns were named whose block of the inverse is asked for; give `last`.")
-    return last
+def asked(trailing: np.ndarray | None) -> np.ndarray:
+    """`trailing`; InputError if it is None."""
+    if trailing is None:
+        raise InputError("no unknowns were named whose block of the inverse is asked for; give `trailing`.")
+    return trailing
 
 
 def triangle_inverse(R: np.ndarray, place: np.ndarray) -> np.ndarray:
@@ -114,14 +112,14 @@ def triangle_product(R: np.ndarray, place: np.ndarray, load: np.ndarray) -> np.n
     return np.asarray(la.cho_solve((R, True), x, check_finite=False))[place]
 
 
-def inverse_block(solver: Any, last: np.ndarray, n: int, columns: int = 64) -> np.ndarray:
-    """The block of the inverse on the unknowns `last` of n, by solves with unit loads, some columns at a time."""
-    C = np.empty((len(last), len(last)))
-    for start in range(0, len(last), columns):
-        chosen = last[start : start + columns]
+def inverse_block(solver: Any, at: np.ndarray, n: int, columns: int = 64) -> np.ndarray:
+    """The block of the inverse on the unknowns `at` of n, by solves with unit loads, some columns at a time."""
+    C = np.empty((len(at), len(at)))
+    for start in range(0, len(at), columns):
+        chosen = at[start : start + columns]
         unit = np.zeros((n, len(chosen)))
         unit[chosen, np.arange(len(chosen))] = 1.0
-        C[:, start : start + columns] = solver.solve(unit)[last]
+        C[:, start : start + columns] = solver.solve(unit)[at]
     return np.asarray((C + C.T) / 2)
 
 

@@ -15,13 +15,13 @@ from scipy.sparse.linalg import splu
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
+from contactopt.solving.constants import LOOSE
 from contactopt.solving.kernels.bonded import SOFTEST, Bonded
 from contactopt.solving.kernels.krylov import krylov_step, model_of
 from contactopt.solving.kernels.semismooth import RIDGE, Equations
 
 FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-4  # accuracy of an iterative step: the first, and the bounds of the others
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
-LOOSE = 0.5  # share of contacts that do not stick, up to which the bonded factorisation is cheaper than a new one
 
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
 # equations, error, balance, D, relative accuracy -> dr, dlambda or None

@@ -38,7 +38,7 @@ FIRST, LOOSEST, TIGHTEST = 0.1, 0.1, 1e-2  # accuracy of a step: the first two, 
 INNER = 1e-2  # accuracy of the Schur complement of the model
 MARGIN = 1.5  # the model's Schur complement over that of a mean fit
 GIVEN = 1e-3  # accuracy of equilibrium under forces to start from
-MOST = 60  # conjugate gradient iterations towards it
+MOST_ITERATIONS = 60  # conjugate gradient iterations towards it
 
 Known = tuple[np.ndarray, np.ndarray, Moved]  # reactions (k, dim), multipliers (p,) and Q r
 
@@ -170,7 +170,7 @@ def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN) -> Sta
     residual = form.pulled(r.ravel())
     X, size, goal = 0.0 * residual, 1.0, 0.0
     p = X
-    for step in range(MOST):
+    for step in range(MOST_ITERATIONS):
         check_time()
         z = form.approximate(residual)
         size, previous = residual.dot(z), size

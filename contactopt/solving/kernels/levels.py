@@ -20,6 +20,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.convolution import Convolution, Kernel, backward, forward
+from contactopt.problem.counter import Counter
 from contactopt.problem.laws import Law
 from contactopt.solving.deadline import check_time
 
@@ -36,7 +37,7 @@ class Level:
 
     kernel  of Q;  components  (c of them) that are solved for
     q       (c, k);  V (c, k, p);  s (p,);  law  of the k contacts;  rho  step of the natural map
-    count   where products are counted, of the finest grid
+    counter counts the products on the finest grid; None on the others
     """
 
     kernel: Kernel
@@ -46,7 +47,7 @@ class Level:
     s: np.ndarray
     law: Law
     rho: float
-    count: list[int] | None = None
+    counter: Counter | None = None
 
     @classmethod
     def of_problem(cls, problem: InterfaceProblem) -> Level:
@@ -66,7 +67,7 @@ class Level:
             problem.s,
             law,
             rho,
-            problem.Q.count,
+            problem.Q.counter,
         )
 
     @property
@@ -121,8 +122,8 @@ class Level:
     def product(self, r: np.ndarray, single: bool = False) -> np.ndarray:
         """Q r (c, k)."""
         check_time()
-        if self.count is not None:
-            self.count[0] += 1
+        if self.counter is not None:
+            self.counter.add()
         grid = self.kernel.grid
         return self.kernel.act(r.reshape(-1, *grid), self.components, self.components, single).reshape(r.shape)
 

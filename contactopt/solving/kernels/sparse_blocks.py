@@ -17,10 +17,9 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from contactopt.problem.operators import Interface
+from contactopt.solving.constants import FULL, SMALL
 
 PIVOT = 0.01  # a diagonal entry this much smaller than the largest of its column is still a pivot
-SMALL = 60  # unknowns up to which LAPACK on an array is faster than a sparse factorisation
-FULL = 0.5  # share of entries from which on it is faster at any size
 
 Solver = Callable[[np.ndarray], np.ndarray]  # right-hand sides (m, j) -> x (m, j)
 

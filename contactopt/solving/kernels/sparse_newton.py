@@ -6,37 +6,50 @@ generalised derivative of P, block diagonal. Contacts where D = 0 (open) are kno
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from functools import cached_property
+
 import numpy as np
 
+from contactopt.solving.constants import ENOUGH, MEMORY, SHORTEST, SUBPROBLEM_STEPS
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.semismooth import Projection
 from contactopt.solving.kernels.sparse_blocks import Blocks, bordered
 
-STEPS = 15  # of one proximal subproblem
-SHORTEST = 1e-2  # of a line search
-MEMORY = 4  # a step is accepted that is below the worst of so many residuals
-ENOUGH = 0.1  # a subproblem is solved when its residual is this much smaller than the change that it makes
-DONE = 1e-13
+DONE = 1e-13  # residual over the size of the forces at which rounding ends the iteration
 
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, d), multipliers (p,)
 
 
+@dataclass(frozen=True, eq=False)
 class ProximalEquations:
-    """The equations of the proximal subproblems of one dimensionless problem.
+    """The equations of one proximal subproblem of a dimensionless problem; with weight 0 they are those of the problem itself.
 
-    q (k, d), V (k d, p), s (p,); compliance (k,) of the contacts, of which rho = 1 / (compliance + weight) is made
+    matrix        Q, with the factors of Newton's matrices
+    q, V, s       (k, d), (k d, p) and (p,) of the problem
+    project       the projection of the law with its derivative
+    compliance    (k,) of the contacts, of which rho = 1 / (compliance + weight) is made
+    center        (k, d) forces from which the proximal term counts; not used while the weight is 0
+    weight        of the proximal term
     """
 
-    def __init__(
-        self, matrix: Blocks, q: np.ndarray, V: np.ndarray, s: np.ndarray, project: Projection, compliance: np.ndarray
-    ):
-        self.matrix, self.q, self.V, self.s, self.project, self.compliance = matrix, q, V, s, project, compliance
-        self.at(np.zeros_like(q), 0.0)
+    matrix: Blocks
+    q: np.ndarray
+    V: np.ndarray
+    s: np.ndarray
+    project: Projection
+    compliance: np.ndarray
+    center: np.ndarray | float = 0.0
+    weight: float = 0.0
 
-    def at(self, center: np.ndarray, weight: float) -> None:
-        """Move to the subproblem of that center and weight."""
-        self.center, self.weight = center, weight
-        self.rho = 1 / np.maximum(self.compliance + weight, 1e-3)
+    def at(self, center: np.ndarray, weight: float) -> ProximalEquations:
+        """The subproblem of that center and weight."""
+        return replace(self, center=center, weight=weight)
+
+    @cached_property
+    def rho(self) -> np.ndarray:
+        """(k,) steps of the fixed-point equations."""
+        return np.asarray(1 / np.maximum(self.compliance + self.weight, 1e-3))
 
     def evaluate(self, r: np.ndarray, lam: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         """Norm of the residual, P(y) - r (k, d), V'r + s (p,) and the derivative of P at y = r - rho u."""
@@ -70,7 +83,7 @@ class ProximalEquations:
         """The last iterate of Newton's method with a line search, whether it solves the subproblem, and the steps."""
         residual, error, balance, D = self.evaluate(r, lam)
         recent = [residual]
-        for steps in range(1, STEPS + 1):
+        for steps in range(1, SUBPROBLEM_STEPS + 1):
             check_time()
             change = self.step(error, balance, D)
             if change is None:
@@ -89,4 +102,4 @@ class ProximalEquations:
             moved = self.weight * float(np.linalg.norm(self.rho[:, None] * (r - self.center)))
             if residual <= max(DONE * float(np.linalg.norm(r)), ENOUGH * moved):
                 return (r, lam), True, steps
-        return (r, lam), False, STEPS
+        return (r, lam), False, SUBPROBLEM_STEPS

@@ -23,14 +23,13 @@ import numpy as np
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
 from contactopt.problem.laws import Projected
+from contactopt.solving.constants import SHARPER, SHARPEST
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.balance import project_balanced
 from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue
 from contactopt.solving.methods import NATIVE, Iterate
 
 INNER = 2000  # products with Q in one subproblem
-SHARPER = 1e-2  # inner accuracy, relative to the change of the last outer iteration
-FINEST = 1e-14
 ROUNDS = 20  # of disc_qp
 
 
@@ -58,7 +57,7 @@ class APG:
             gradient = lambda y, q=q: (problem.Q @ y.ravel()).reshape(q.shape) + q  # noqa: E731
             new, lam = accelerate(gradient, prox, r, lam, step, target * max(1.0, float(np.linalg.norm(r))))
             change = float(np.linalg.norm(new - r)) / max(1.0, float(np.linalg.norm(new)))
-            r, target = new, max(SHARPER * min(change, 1e2 * target), FINEST)
+            r, target = new, max(SHARPER * min(change, 1e2 * target), SHARPEST)
             yield r, lam
 
 

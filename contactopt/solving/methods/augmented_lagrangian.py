@@ -61,8 +61,7 @@ class AugmentedLagrangian:
         equations = proximal_equations(problem, block_matrix(problem.Q, problem.dim))
         solved = True
         while solved:
-            equations.at(point[0], 1 / self.rho)
-            point, solved, _ = equations.solve(*point)
+            point, solved, _ = equations.at(point[0], 1 / self.rho).solve(*point)
             yield point
 
     def _uzawa(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:

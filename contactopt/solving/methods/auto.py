@@ -5,7 +5,7 @@
    falls. Elastic bodies end here (reports/newton_steps), each step one dense linear system.
 2. The interior-point method (contactopt.solving.kernels.interior), which no cycle and no rank deficiency of Q disturbs,
    and a few steps of the proximal loop for the last digits. They need no symmetric Q and no backend.
-3. Where these fail and Q is a symmetric array: CONES iterations of the Acary-Cadoux fixed point, convex programs.
+3. Where these fail and Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point, convex programs.
    Where that fails too, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
 4. The proximal loop from the best of these points, its weight falling slowly: jammed packings need hundreds of steps.
 5. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
@@ -30,6 +30,19 @@ from contactopt.errors import BackendError, InputError
 from contactopt.problem import InterfaceProblem, infeasibility
 from contactopt.problem.convolution import Convolution
 from contactopt.problem.operators import InterfaceOperator
+from contactopt.solving.constants import (
+    CLOSE,
+    CONE_PROGRAMS,
+    GENTLE_ALPHA,
+    LARGER,
+    LEAST_ALPHA,
+    NEWTON_STEPS,
+    PATIENCE,
+    POLISH,
+    PROGRESS,
+    ROUND,
+    SPARSE_ROUND,
+)
 from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations, definite
 from contactopt.solving.kernels.interior import interior_iterates
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
@@ -42,18 +55,6 @@ from contactopt.solving.notes import note
 from contactopt.solving.preconditioners import find_preconditioner
 
 logger = logging.getLogger(__name__)
-
-LIMIT = 25  # Newton steps
-PATIENCE = 6  # of them without progress
-PROGRESS = 0.9  # a residual that falls by less is no progress
-CONES = 5  # cone programs
-CLOSE = 1e-3  # error of an interior point from which Newton's method finds the last digits
-LEAST = 1e-4  # weight of the first of them
-FEW = 10  # proximal steps for the last digits, each so many of which must halve the residual
-ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
-PATIENT = 100  # of the first of a sparse Q, where random forces lead nowhere
-STRONG = 0.1  # weight with which the gentle loop begins
-LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class Auto:
                 return
         matrix = block_matrix(problem.Q, problem.dim)
         if start is not None and sp.issparse(problem.Q):
-            reached = yield from self._proximal(problem, matrix, start, FEW, LEAST)
+            reached = yield from self._proximal(problem, matrix, start, POLISH, LEAST_ALPHA)
         if AcaryCadoux().solves(problem.law) and not problem.law.dilatant:
             for full in (True, False):
                 reached = yield from self._interior(problem, matrix, reached, full)
@@ -99,7 +100,9 @@ class Auto:
         random = np.random.default_rng(0)
         for restarts in count():
             if sp.issparse(problem.Q):
-                last = yield from self._proximal(problem, matrix, reached, PATIENT * 2**restarts, STRONG, gentle=True)
+                last = yield from self._proximal(
+                    problem, matrix, reached, SPARSE_ROUND * 2**restarts, GENTLE_ALPHA, gentle=True
+                )
             else:
                 last = yield from self._proximal(problem, matrix, reached, ROUND * 2**restarts, Proximal.alpha)
             r = random.normal(size=problem.q.shape)
@@ -133,7 +136,7 @@ class Auto:
             since = 0 if residual < PROGRESS * best else since + 1
             if residual < best:
                 best, reached = residual, point[:2]
-            tired = since >= PATIENCE or steps >= LIMIT
+            tired = since >= PATIENCE or steps >= NEWTON_STEPS
             if tired and (operator is None or operator.products >= problem.q.size):
                 break
         return reached or cold_start(problem)
@@ -146,7 +149,7 @@ class Auto:
         equations = coulomb_equations(problem)
         best, reached = equations.evaluate(*start)[0], start
         try:
-            for point in islice(AcaryCadoux().iterate(problem), CONES):
+            for point in islice(AcaryCadoux().iterate(problem), CONE_PROGRAMS):
                 yield point
                 residual = equations.evaluate(*point)[0]
                 best, reached = min((best, reached), (residual, point), key=lambda pair: pair[0])
@@ -168,8 +171,8 @@ class Auto:
             if error < best:
                 best, reached = error, point
         if best < CLOSE:
-            alpha = max(LEAST, 100 * best)
-            reached = yield from Auto._proximal(problem, matrix, reached, FEW, alpha)
+            alpha = max(LEAST_ALPHA, 100 * best)
+            reached = yield from Auto._proximal(problem, matrix, reached, POLISH, alpha)
         evaluate = proximal_equations(problem, matrix).evaluate
         return min(start, reached, key=lambda point: evaluate(*point)[0])
 
@@ -178,11 +181,11 @@ class Auto:
         problem: InterfaceProblem, matrix: Blocks, start: Iterate, patience: int, alpha: float, gentle: bool = False
     ) -> Generator[Iterate, None, Iterate]:
         """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last."""
-        equations, check = (proximal_equations(problem, matrix) for _ in range(2))
+        equations = proximal_equations(problem, matrix)
         best, target, point = np.inf, np.inf, start
         for done, point in enumerate(proximal_iterates(equations, start, alpha, gentle), start=1):
             yield point
-            best = min(best, check.evaluate(*point)[0])
+            best = min(best, equations.evaluate(*point)[0])
             if done % patience == 0:
                 if best > target:
                     break

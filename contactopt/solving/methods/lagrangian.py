@@ -24,6 +24,7 @@ from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
 from contactopt.problem.laws import Law
+from contactopt.solving.constants import SHARPER, SHARPEST
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.balance import project_balanced
 from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue, smalbe
@@ -31,8 +32,6 @@ from contactopt.solving.kernels.semismooth import Projection, crossover
 from contactopt.solving.methods import NATIVE, Iterate
 
 INNER = 5000  # Uzawa steps in one tangential problem
-SHARPER = 1e-2  # accuracy of the inner iteration relative to the last outer change, so that it never limits the outer
-FINEST = 1e-14
 ROUGH = 1e-4  # of the normal problem, before the active set steps
 
 
@@ -59,7 +58,7 @@ class Lagrangian:
         change = 1.0
         while True:
             r_n, lam[pushes] = normal.exact(r_n, r_t, lam)
-            new, lam[~pushes] = tangential.uzawa(r_t, r_n, lam, max(SHARPER * change, FINEST))
+            new, lam[~pushes] = tangential.uzawa(r_t, r_n, lam, max(SHARPER * change, SHARPEST))
             change = float(np.linalg.norm(new - r_t)) / max(1.0, float(np.linalg.norm(new)))
             r_t = new + (1 - self.relaxation) * (r_t - new)
             yield np.concatenate([r_n[:, None], r_t], axis=1), lam.copy()

@@ -20,15 +20,13 @@ import numpy as np
 from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
+from contactopt.solving.constants import EASY, FALL, GENTLE_FALL, GENTLE_RISE, RISE, SUBPROBLEM_STEPS
 from contactopt.solving.kernels.alart_curnier import cold_start
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
-from contactopt.solving.kernels.sparse_newton import STEPS, ProximalEquations
+from contactopt.solving.kernels.sparse_newton import ProximalEquations
 from contactopt.solving.methods import NATIVE, Iterate
 
-FALL, RISE = 5.0, 8.0
-GENTLE = 1.5, 3.0  # fall and rise of the gentle loop, which falls after subproblems of at most EASY steps only
-EASY = 6
-SMALLEST, LARGEST = 1e-12, 1e6  # weights; where even the largest fails, the loop ends
+LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6  # of the proximal term; where even the largest fails, the loop ends
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ class Proximal:
 
 
 def proximal_equations(problem: InterfaceProblem, matrix: Blocks) -> ProximalEquations:
-    """Alart and Curnier's equations of a dimensionless problem, to be centred."""
+    """Alart and Curnier's equations of a dimensionless problem, without a proximal term."""
     compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1)
     return ProximalEquations(matrix, problem.q, problem.V, problem.s, problem.law.project, compliance)
 
@@ -66,13 +64,12 @@ def proximal_iterates(
 
     gentle  alpha changes slowly, so that few subproblems fail: for problems on which every smaller alpha soon fails
     """
-    (fall, rise), easy = (GENTLE, EASY) if gentle else ((FALL, RISE), STEPS)
-    while alpha < LARGEST:
-        equations.at(point[0], alpha)
-        new, solved, steps = equations.solve(*point)
+    (fall, rise), easy = ((GENTLE_FALL, GENTLE_RISE), EASY) if gentle else ((FALL, RISE), SUBPROBLEM_STEPS)
+    while alpha < LARGEST_WEIGHT:
+        new, solved, steps = equations.at(point[0], alpha).solve(*point)
         yield new
         point = new if solved else point
         if not solved:
             alpha *= rise
         elif steps <= easy:
-            alpha = max(alpha / fall, SMALLEST)
+            alpha = max(alpha / fall, LEAST_WEIGHT)

@@ -125,7 +125,7 @@ def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
 
 def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Preconditioner:
     """One preconditioner from those of the pairs of surfaces."""
-    rows = [slice(pair.first * problem.dim, pair.last * problem.dim) for pair in problem.pairs]
+    rows = [slice(pair.start * problem.dim, pair.stop * problem.dim) for pair in problem.pairs]
 
     def product(x: np.ndarray) -> np.ndarray:
         return np.concatenate([part @ x[own] for part, own in zip(parts, rows)])

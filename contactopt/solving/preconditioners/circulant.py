@@ -34,13 +34,13 @@ def norm(m: float, h: float) -> np.ndarray:
     return column
 
 
-def p21(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
+def p21(problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
     """P21 of eq (25) or, in 3D, P31 of eq (29) on the grid of the contacts.
 
     Parameters
     ----------
     problem : whose contacts lie on a line or a rectangular grid of their chart
-    still : (k, dim) mask of the components that cannot move
+    held : (k, dim) mask of the components that cannot move
 
     Returns
     -------
@@ -50,16 +50,16 @@ def p21(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
     ------
     InputError : if the contacts lie on no such grid
     """
-    return on_grid(problem, still, extended)
+    return on_grid(problem, held, extended)
 
 
-def p22(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
+def p22(problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
     """P22 of eq (26) on the contact line.
 
     Parameters
     ----------
     problem : whose contacts lie on a line or a rectangular grid of their chart
-    still : (k, dim) mask of the components that cannot move
+    held : (k, dim) mask of the components that cannot move
 
     Returns
     -------
@@ -69,7 +69,7 @@ def p22(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
     ------
     InputError : if the contacts lie on no such grid
     """
-    return on_grid(problem, still, inverse_of_extended)
+    return on_grid(problem, held, inverse_of_extended)
 
 
 def extended(grid: Grid) -> tuple[GridMap, None]:

@@ -89,9 +89,9 @@ def grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarr
     return Grid(tuple(ticks), np.moveaxis(np.array(ends), 2, 0), weights, turn=turn if oblique else None), order
 
 
-def on_grid(problem: InterfaceProblem, still: np.ndarray, make: Callable[[Grid], GridMaps]) -> GridMaps:
+def on_grid(problem: InterfaceProblem, held: np.ndarray, make: Callable[[Grid], GridMaps]) -> GridMaps:
     """Products on arrays (k, dim) from those on the grid of the contacts (*shape, dim), which `make` gives."""
-    grid, order = grid_of(problem, still)
+    grid, order = grid_of(problem, held)
     product, inverse = make(grid)
 
     def placed(act: GridMap) -> GridMap:

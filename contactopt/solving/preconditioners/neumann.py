@@ -79,13 +79,13 @@ def direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
     return Direction(waves, np.maximum(values, 0.0), along(vectors.T), along(vectors))
 
 
-def neumann(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
+def neumann(problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
     """Square root of the Laplacian on the grid of the contacts, and its inverse.
 
     Parameters
     ----------
     problem : whose contacts lie on a line or a rectangular grid of their chart
-    still : (k, dim) mask of the components that cannot move
+    held : (k, dim) mask of the components that cannot move
 
     Returns
     -------
@@ -95,7 +95,7 @@ def neumann(problem: InterfaceProblem, still: np.ndarray) -> GridMaps:
     ------
     InputError : if the contacts lie on no such grid
     """
-    return on_grid(problem, still, root_on_grid)
+    return on_grid(problem, held, root_on_grid)
 
 
 def root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:

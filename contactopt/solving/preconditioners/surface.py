@@ -37,7 +37,7 @@ Act = Callable[[np.ndarray], np.ndarray]
 Root = tuple[Act, Act]  # products with P and with G = P^-1
 
 
-def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
+def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
     """Products (k, dim) -> (k, dim) with P and with its inverse G, scaled to a mean diagonal of one.
 
     The mean diagonal is an estimate by random signs (Hutchinson 1989).
@@ -45,7 +45,7 @@ def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
     Parameters
     ----------
     problem : whose chart knows the cells of the contact surface
-    still : (k, dim) mask of the components that cannot move
+    held : (k, dim) mask of the components that cannot move
 
     Returns
     -------
@@ -66,10 +66,11 @@ def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
     # Forces are spread over the nodal areas, which differ from the mass where the surface goes around an axis.
     depth = problem.areas / mass
     depth = np.maximum(depth / depth.mean(), THINNEST)
-    patterns, which = np.unique(still, axis=1, return_inverse=True)
-    held = [(pattern, which.ravel() == i) for i, pattern in enumerate(patterns.T) if not pattern.all()]
+    patterns, which = np.unique(held, axis=1, return_inverse=True)
     roots = [
-        (~pattern, components, square_root(K, mass, shift, share, depth, ~pattern)) for pattern, components in held
+        (~pattern, which.ravel() == i, square_root(K, mass, shift, share, depth, ~pattern))
+        for i, pattern in enumerate(patterns.T)
+        if not pattern.all()
     ]
 
     def product(X: np.ndarray, inverse: bool) -> np.ndarray:
@@ -79,8 +80,8 @@ def laplacian(problem: InterfaceProblem, still: np.ndarray) -> Root:
             out[there] = root[inverse](X[there])
         return out
 
-    signs = np.where(np.random.default_rng(0).random(still.shape) < 0.5, -1.0, 1.0) * ~still
-    mean = float(np.sum(signs * product(signs, True))) / max(int((~still).sum()), 1) or 1.0
+    signs = np.where(np.random.default_rng(0).random(held.shape) < 0.5, -1.0, 1.0) * ~held
+    mean = float(np.sum(signs * product(signs, True))) / max(int((~held).sum()), 1) or 1.0
     return lambda X: mean * product(X, False), lambda X: product(X, True) / mean
 
 

@@ -1,0 +1,329 @@
+# %% [markdown]
+# # Chapter 1. A spring, a node and a floor
+#
+# The smallest contact problem has one unknown. It already shows everything that this course is about: an energy with a
+# constraint, its dual in forces, the optimality conditions that join them, a program that a solver can read, and several
+# ways to go wrong.
+#
+# You need: derivatives, and the idea of a minimum under a constraint. Time: 30 minutes with the exercises.
+
+# %%
+import cvxpy as cp
+import matplotlib.pyplot as plt
+import numpy as np
+
+from contactopt import InterfaceProblem, solve
+from contactopt.teaching import Slider, check
+
+# %% [markdown]
+# ## The mechanical system
+#
+# A node hangs on a spring of stiffness $k$ above a floor. Without load the gap between node and floor is $g_0$. A load $F$
+# pulls the node down. We call the gap that remains $u$, and the force of the floor on the node $r$. The normal $n$ points
+# out of the floor, upwards: $u$ and $r$ are positive in its direction.
+#
+# | letter | meaning | unit |
+# |---|---|---|
+# | $k$ | stiffness of the spring | N/mm |
+# | $g_0$ | gap without load | mm |
+# | $F$ | load, downwards | N |
+# | $u \ge 0$ | gap that remains | mm |
+# | $r \ge 0$ | force of the floor on the node, upwards | N |
+
+# %%
+k, g0, F = 2.0, 1.0, 5.0
+
+
+def sketch(ax, u, r):
+    ax.axhspan(-0.5, 0, color="0.8", lw=0)
+    ax.axhline(0, color="k", lw=1)
+    y = np.linspace(u, 3, 13)
+    ax.plot(np.concatenate([[0], 0.15 * (-1.0) ** np.arange(11), [0]]), y, "C0", lw=1.5)
+    ax.plot([-0.6, 0.6], [3, 3], "k", lw=3)
+    ax.plot(0, u, "o", ms=10, color="C0")
+    for x, y0, y1, name, color in ((0.5, u + 0.6, u, "$F$", "C3"), (-0.5, u - 0.6, u, f"$r$ = {r:.1f} N", "C1")):
+        ax.annotate("", (x, y1), (x, y0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
+        ax.text(x + 0.08, (y0 + y1) / 2, name, color=color)
+    ax.annotate("", (1.1, u), (1.1, 0), arrowprops={"arrowstyle": "<->", "color": "C2"})
+    ax.text(1.15, u / 2, f"$u$ = {u:.1f} mm", color="C2", va="center")
+    ax.set(xlim=(-1.2, 2.2), ylim=(-0.7, 3.2), aspect="equal")
+    ax.axis("off")
+
+
+fig, ax = plt.subplots(figsize=(4, 4), layout="constrained")
+sketch(ax, 1.0, 0.0)
+
+# %% [markdown]
+# ## The primal problem: an energy in displacements
+#
+# The spring stores the energy $\tfrac12 k (u - g_0)^2$. The load does work when the node moves down, so its potential is
+# $+F u$. The node goes where the sum is smallest, as long as the floor lets it:
+#
+# $$ \min_{u \ge 0} \; E(u), \qquad E(u) = \tfrac12 k\,(u - g_0)^2 + F u . $$
+#
+# The derivative $E'(u) = k (u - g_0) + F$ is the force that is missing for equilibrium. The floor supplies it. This is the
+# meaning of the *multiplier* of the constraint $u \ge 0$: it is the contact force,
+#
+# $$ r = E'(u) = k\,(u - g_0) + F . $$
+
+# %%
+u = cp.Variable()
+floor = u >= 0
+primal = cp.Problem(cp.Minimize(k * (u - g0) ** 2 / 2 + F * u), [floor])
+primal.solve(solver=cp.CLARABEL)
+print(f"gap u = {u.value:.4f} mm, multiplier r = {floor.dual_value:.4f} N")
+
+assert np.isclose(u.value, 0.0, atol=1e-5)
+assert np.isclose(floor.dual_value, F - k * g0, atol=1e-4)
+
+# %% [markdown]
+# ## The optimality conditions
+#
+# Karush, Kuhn and Tucker's conditions of this program are *Signorini's conditions* and equilibrium:
+#
+# $$ r = k\,(u - g_0) + F, \qquad u \ge 0, \qquad r \ge 0, \qquad u\, r = 0 . $$
+#
+# Read them aloud. The node does not pass through the floor. The floor pushes and never pulls. Where there is a gap there is
+# no force, and where there is a force there is no gap. Move the slider, and watch which of $u$ and $r$ is zero.
+
+
+# %%
+def state(load):
+    gap = max(g0 - load / k, 0.0)
+    force = max(load - k * g0, 0.0)
+    fig, (left, right) = plt.subplots(1, 2, figsize=(7, 3.4), layout="constrained")
+    sketch(left, gap, force)
+    w = np.linspace(-1, 2, 200)
+    right.plot(w, k * (w - g0) ** 2 / 2 + load * w, "C0")
+    right.axvspan(-1, 0, color="0.85", lw=0)
+    right.plot(gap, k * (gap - g0) ** 2 / 2 + load * gap, "o", color="C1", ms=9)
+    right.set(xlabel="gap $u$ [mm]", ylabel="energy [N mm]", title=f"load F = {load:.1f} N", ylim=(-5, 8))
+    return fig
+
+
+Slider("load F [N]", np.linspace(0, 5, 11), state, start=10)
+
+# %% [markdown]
+# ## The dual problem: the same in forces
+#
+# Solve the equilibrium for the gap: $u = r / k + g_0 - F / k$. We write this as
+#
+# $$ u = Q\,r + q, \qquad Q = 1/k, \qquad q = g_0 - F/k . $$
+#
+# $Q$ is the *compliance* of the body, and $q$ is the gap that the node would have if the floor were not there; a negative $q$
+# means that it would pass through. Signorini's conditions now say that $r \ge 0$, that $Q r + q \ge 0$, and that one of both
+# is zero. They are the optimality conditions of
+#
+# $$ \min_{r \ge 0} \; \tfrac12 Q\, r^2 + q\, r . $$
+#
+# What was the unknown has become the multiplier, and what was the multiplier has become the unknown. This dual problem is
+# the one that contactopt solves, because later its unknowns live on the contact surface alone.
+
+# %%
+Q, q = 1 / k, g0 - F / k
+r = cp.Variable()
+push = r >= 0
+dual = cp.Problem(cp.Minimize(Q * r**2 / 2 + q * r), [push])
+dual.solve(solver=cp.CLARABEL)
+print(f"force r = {r.value:.4f} N, multiplier u = {push.dual_value:.4f} mm")
+
+assert np.isclose(r.value, F - k * g0, atol=1e-4)
+assert np.isclose(
+    primal.value + dual.value, F * g0 - F**2 / (2 * k), atol=1e-4
+)  # up to the sign and a constant they are equal
+
+# %% [markdown]
+# contactopt solves the same problem. It wants one row of $q$ per contact, with a normal and a tangential component. Our
+# node does not move sideways, so the tangential entries are zero.
+
+# %%
+problem = InterfaceProblem(np.diag([Q, Q]), [[q, 0.0]], 0.0)
+answer = solve(problem)
+print(answer.status, answer.reactions)
+
+assert answer.solved and np.allclose(answer.reactions, [[3.0, 0.0]])
+
+# %% [markdown]
+# ## Penalty: a soft floor
+#
+# Many codes replace the floor by a second, stiff spring of stiffness $\kappa$ that acts only when the node is below zero:
+#
+# $$ \min_u \; E(u) + \tfrac12 \kappa \min(u, 0)^2 . $$
+#
+# The program has no constraint any more, but the node sinks in: where it touches, $u = -(F - k g_0) / (k + \kappa)$. A
+# larger $\kappa$ reduces this error. It also makes the stiffness of the system jump by the factor $1 + \kappa / k$ when
+# contact begins, which is what makes large penalty problems hard to solve.
+#
+# ## Nitsche: consistent without a multiplier
+#
+# Nitsche's method also has the displacement as its only unknown. It uses that the contact force is known as soon as the
+# displacement is: it is the residual $r(u) = k (u - g_0) + F$. Signorini's conditions are the same as the one equation
+# $r = [\,r - \gamma u\,]_+$ for any $\gamma > 0$, where $[x]_+ = \max(x, 0)$. The method minimises
+#
+# $$ E(u) - \frac{1}{2\gamma} r(u)^2 + \frac{1}{2\gamma} [\,r(u) - \gamma u\,]_+^2 . $$
+#
+# Its derivative is $(1 - k/\gamma)\,\bigl(r - [r - \gamma u]_+\bigr)$. So it vanishes exactly at the solution, for every
+# $\gamma$ but $\gamma = k$: the method is *consistent*, while the penalty method is not. But there is a price: the function
+# is convex only if $\gamma > k$. Below, it has no minimum.
+#
+# ## Proximal Galerkin: never below the floor
+#
+# The youngest of the four methods writes the gap as $u = e^{\psi}$ with a *latent variable* $\psi$. A gap of this form is
+# always positive. The energy is minimised in steps; each step adds the distance from the last gap, measured by the
+# entropy. The condition of one step with the step size $\alpha$ is
+#
+# $$ \alpha\, E'(e^{\psi}) + \psi - \psi_{\text{last}} = 0 . $$
+#
+# At contact every step multiplies the gap by about $e^{-\alpha r}$, and $(\psi_{\text{last}} - \psi) / \alpha$ tends to the
+# contact force. We compare the four methods.
+
+
+# %%
+def residual_force(u):
+    return k * (u - g0) + F
+
+
+def proximal_galerkin(steps, alpha=1.0):
+    psi, gaps, forces = 0.0, [], []
+    for _ in range(steps):
+        last = psi
+        for _ in range(50):  # Newton's method for one unknown
+            slope = alpha * k * np.exp(psi) + 1
+            psi -= (alpha * residual_force(np.exp(psi)) + psi - last) / slope
+        gaps.append(np.exp(psi))
+        forces.append((last - psi) / alpha)
+    return gaps, forces
+
+
+gaps, forces = proximal_galerkin(6)
+stiffness = 10.0 ** np.arange(1, 7)
+sunk = -(F - k * g0) / (k + stiffness)
+
+gamma = 4.0
+v = cp.Variable()
+nitsche = cp.Minimize(  # E - r^2 / (2 gamma), written as one parabola so that cvxpy sees that it is convex
+    (k - k**2 / gamma) / 2 * (v - g0) ** 2
+    + F * (1 - k / gamma) * (v - g0)
+    + cp.square(cp.pos(k * (v - g0) + F - gamma * v)) / (2 * gamma)
+)
+cp.Problem(nitsche).solve(solver=cp.CLARABEL)
+print(f"Nitsche: gap {v.value:.1e} mm, force {residual_force(v.value):.4f} N")
+print(f"proximal Galerkin after 6 steps: gap {gaps[-1]:.1e} mm, force {forces[-1]:.4f} N")
+
+fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+left.loglog(stiffness / k, -sunk, "o-")
+left.set(xlabel=r"penalty stiffness $\kappa / k$ [-]", ylabel="depth below the floor [mm]", title="penalty")
+right.semilogy(range(1, 7), gaps, "s-", color="C1")
+right.set(xlabel="step [-]", ylabel="gap above the floor [mm]", title="proximal Galerkin")
+
+assert np.isclose(v.value, 0.0, atol=1e-4) and np.isclose(residual_force(v.value), 3.0, atol=1e-3)
+assert np.all(np.array(gaps) > 0) and np.isclose(forces[-1], 3.0, rtol=1e-2)
+assert np.isclose(sunk[-1] * stiffness[-1], -3.0, rtol=1e-4)
+
+# %% [markdown]
+# | method | unknowns | error | fails when |
+# |---|---|---|---|
+# | multiplier (the programs above) | $u$ and $r$ | none | the problem has no solution |
+# | penalty | $u$ | penetration $\sim 1/\kappa$ | $\kappa$ is so large that rounding takes over |
+# | Nitsche | $u$ | none | $\gamma$ is smaller than the stiffness |
+# | proximal Galerkin | $\psi$ | gap $\sim e^{-\alpha r \cdot \text{steps}}$ | contact with $r = 0$: the gap falls only slowly |
+#
+# ## What fails: a body that nothing holds
+#
+# Cut the spring, $k = 0$, and pull the node up, $F = -1$. The energy $F u$ falls for ever as the gap grows: the primal problem
+# is *unbounded*. The dual problem has to carry the load by a force $r = F$ that may not be negative: it is *infeasible*. Both
+# words say that the node flies away.
+
+# %%
+free = cp.Variable(nonneg=True)
+unbounded = cp.Problem(cp.Minimize(-1.0 * free))
+unbounded.solve(solver=cp.CLARABEL)
+print(unbounded.status)
+
+assert unbounded.status == "unbounded"
+
+# %% [markdown]
+# ## Exercises
+#
+# Replace `...` by your answer and run the cell; it grades itself. The first two need pen and paper only.
+#
+# **1.1** A spring of stiffness 4 N/mm holds a node .5 mm above the floor. A load of 5 N pulls it down. How large are the gap
+# and the contact force?
+
+# %% tags=["exercise"]
+answer = (..., ...)  # gap [mm], force [N]
+
+# %% [markdown] tags=["solution"]
+# The spring would let the node sink by $5/4 = 1.25$ mm, more than .5 mm. So it touches, $u = 0$, and
+# $r = F - k g_0 = 5 - 2 = 3$ N.
+
+# %% tags=["solution"]
+answer = (0.0, 3.0)
+
+# %%
+check("1.1", answer if ... not in answer else ..., (0.0, 3.0))
+
+# %% [markdown]
+# **1.2** For which load does the node of 1.1 just touch the floor?
+
+# %% tags=["exercise"]
+answer = ...  # N
+
+# %% [markdown] tags=["solution"]
+# The gap $g_0 - F / k$ is zero at $F = k g_0 = 2$ N. The contact force is zero there too: both members of the pair are zero.
+# Such a contact is called *weakly active*.
+
+# %% tags=["solution"]
+answer = 4 * 0.5
+
+# %%
+check("1.2", answer, 2.0)
+
+# %% [markdown]
+# **1.3** Hang a ceiling 2 mm above the floor, so that $0 \le u \le 2$. Pull the node of this chapter ($k = 2$, $g_0 = 1$)
+# *up*, with $F = -5$. Write the primal program in cvxpy. Which force does the ceiling exert?
+
+# %% tags=["exercise"]
+answer = ...  # N, positive
+
+# %% [markdown] tags=["solution"]
+# The multiplier of $u \le 2$ is the force of the ceiling. By hand: $-E'(2) = -(2 \cdot 1 - 5) = 3$ N.
+
+# %% tags=["solution"]
+w = cp.Variable()
+ceiling = w <= 2
+cp.Problem(cp.Minimize(k * (w - g0) ** 2 / 2 - 5 * w), [w >= 0, ceiling]).solve(solver=cp.CLARABEL)
+answer = float(ceiling.dual_value)
+
+# %%
+check("1.3", answer, 3.0)
+
+# %% [markdown]
+# **1.4** How stiff must the penalty spring be, so that the node of this chapter sinks in by .01 mm only? How many times as
+# stiff as the spring is it?
+
+# %% tags=["exercise"]
+answer = ...  # kappa / k [-]
+
+# %% [markdown] tags=["solution"]
+# $(F - k g_0) / (k + \kappa) = 3 / (2 + \kappa) = 0.01$ gives $\kappa = 298$ N/mm, 149 times the spring's stiffness.
+
+# %% tags=["solution"]
+answer = (3 / 0.01 - k) / k
+
+# %%
+check("1.4", answer, 149.0)
+
+# %% [markdown]
+# ## References
+#
+# - N. Kikuchi, J. T. Oden, *Contact Problems in Elasticity*, SIAM 1988, [doi:10.1137/1.9781611970845](https://doi.org/10.1137/1.9781611970845).
+# - F. Chouly, P. Hild, A Nitsche-based method for unilateral contact problems, *SIAM J. Numer. Anal.* 51 (2013),
+#   [doi:10.1137/12088344X](https://doi.org/10.1137/12088344X).
+# - B. Keith, T. M. Surowiec, Proximal Galerkin: a structure-preserving finite element method for pointwise bound
+#   constraints, *Found. Comput. Math.* (2024), [doi:10.1007/s10208-024-09681-8](https://doi.org/10.1007/s10208-024-09681-8).
+#
+# Next: [friction](chapter_2_friction_at_one_node.py).
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script

@@ -1,0 +1,289 @@
+# %% [markdown]
+# # Chapter 2. Friction at one node
+#
+# Now the node can also move along the floor, and friction resists. With a *given* bound on the friction force the problem is
+# still the minimum of an energy. With Coulomb's law the bound depends on the answer, and the problem is no minimum any more.
+#
+# You need: chapter 1. Time: 40 minutes with the exercises.
+
+# %%
+import cvxpy as cp
+import matplotlib.pyplot as plt
+import numpy as np
+
+from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve
+from contactopt.teaching import Slider, check
+
+# %% [markdown]
+# ## The mechanical system
+#
+# Two springs hold the node, a vertical one and one at 45 degrees. The load pulls it down and to the right. All vectors are
+# written with the normal component first: $u = (u_n, u_t)$ and $r = (r_n, r_t)$. The normal points up, the tangent to the
+# right, and $r$ is the force of the floor on the node.
+
+# %%
+k_vertical, k_inclined = 1.0, 2.0  # N/mm
+along = np.array([1.0, 1.0]) / np.sqrt(2)  # direction of the inclined spring: up and to the right
+K = k_vertical * np.diag([1.0, 0.0]) + k_inclined * np.outer(along, along)
+Q = np.linalg.inv(K)
+load = np.array([-3.0, 1.0])  # N: 3 N down, 1 N to the right
+q = np.array([1.0, 0.0]) + Q @ load  # 1 mm of gap without load; q is where the load alone would bring the node
+mu = 0.5
+print("K =", K.tolist(), " Q =", np.round(Q, 6).tolist(), " q =", q)
+
+fig, ax = plt.subplots(figsize=(4.6, 3.6), layout="constrained")
+ax.axhspan(-0.5, 0, color="0.8", lw=0)
+ax.axhline(0, color="k", lw=1)
+for end in ((0, 2.2), (1.5, 1.9)):
+    way, side = np.array(end) - [0, 0.4], np.array([-(end[1] - 0.4), end[0]]) / np.hypot(end[0], end[1] - 0.4)
+    steps = np.linspace(0, 1, 13)[:, None]
+    zigzag = np.concatenate([[0], 0.09 * (-1.0) ** np.arange(11), [0]])[:, None]
+    ax.plot(*([0, 0.4] + steps * way + zigzag * side).T, "C0", lw=1.5)
+    ax.plot(*end, "ks", ms=8)
+ax.plot(0, 0.4, "o", ms=11, color="C0")
+for tail, head, name, color in (
+    ((0, 0.4), (0.7, 0.05), "load", "C3"),
+    ((0.0, -0.45), (0.0, 0.28), "$r_n$", "C1"),
+    ((-1.0, 0.4), (-0.15, 0.4), "$r_t$", "C1"),
+    ((-1.4, 0), (-1.4, 0.7), "$n$", "k"),
+    ((-1.4, 0), (-0.75, 0), "$t$", "k"),
+):
+    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
+    ax.text((tail[0] + head[0]) / 2 + 0.06, (tail[1] + head[1]) / 2 + 0.08, name, color=color)
+ax.set(xlim=(-1.7, 2), ylim=(-0.6, 2.4), aspect="equal")
+ax.axis("off")
+
+assert np.allclose(Q, [[1, -1], [-1, 2]]) and np.allclose(q, [-3, 5])
+
+# %% [markdown]
+# The entry $Q_{nt} = -1$ couples the directions: a force to the right lets the node move down, because the inclined spring
+# guides it.
+#
+# ## Primal: an energy with a given friction bound
+#
+# Suppose that the friction force cannot exceed a known number $g$ (*Tresca friction*). Moving the node by $u_t$ against it
+# costs the work $g |u_t|$. So the node minimises
+#
+# $$ \min_{u_n \ge 0} \; \tfrac12 (u - q)' K (u - q) + g\,|u_t| . $$
+#
+# ## Dual: forces in a box
+#
+# The dual has the contact forces as unknowns:
+#
+# $$ \min_r \; \tfrac12 r' Q r + q' r \qquad \text{subject to} \qquad r_n \ge 0, \quad |r_t| \le g . $$
+#
+# The optimality conditions of both are the same: $u = Q r + q$, Signorini's conditions, and
+#
+# $$ |r_t| \le g, \qquad u_t \ne 0 \;\Rightarrow\; r_t = -g\, \frac{u_t}{|u_t|} . $$
+#
+# If the bound is not reached the node *sticks*; if it is reached the node may *slip*, against the friction force.
+
+
+# %%
+def primal(g):
+    u = cp.Variable(2)
+    floor = u[0] >= 0
+    cp.Problem(cp.Minimize(cp.quad_form(u - q, K) / 2 + g * cp.abs(u[1])), [floor]).solve(solver=cp.CLARABEL)
+    return K @ (u.value - q)  # the force that is missing in the springs
+
+
+def dual(g, Q=Q, q=q):
+    r = cp.Variable(2)
+    box = [r[0] >= 0, cp.abs(r[1]) <= g]
+    cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), box).solve(solver=cp.CLARABEL)
+    return r.value
+
+
+for g in (0.0, 1.0, 2.0, 3.0):
+    print(f"bound {g} N: primal {np.round(primal(g), 4)}, dual {np.round(dual(g), 4)}")
+    assert np.allclose(primal(g), dual(g), atol=1e-4)
+assert np.allclose(dual(3.0), -K @ q, atol=1e-4)  # from 2 N on the node sticks: u = 0
+
+# %% [markdown]
+# ## Coulomb: the bound depends on the answer
+#
+# Coulomb's law says $g = \mu r_n$. Neither program can be used with a bound that contains its own answer: if we write
+# $\mu r_n$ into the constraint of the dual, we get another law, as we shall see. What we can do is to guess $g$, solve, set
+# $g = \mu r_n$, and solve again.
+
+# %%
+g, history = 0.0, []
+for _ in range(30):
+    r = dual(g)
+    g = mu * r[0]
+    history.append(r)
+print("Tresca's iteration:", np.round(history[:4], 3).tolist(), "...", np.round(r, 4))
+
+problem = InterfaceProblem(Q, [q], mu)
+assert np.allclose(r, [2.0, -1.0], atol=1e-4)
+assert natural_map_residual(problem, r[None]) < 1e-4
+
+# %% [markdown]
+# The answer can be checked by hand. The node slips to the right, so $r_t = -\mu r_n$. It touches, so
+# $0 = u_n = r_n + \tfrac12 r_n - 3$. Hence $r_n = 2$, $r_t = -1$, and the slip is $u_t = -2 - 2 + 5 = 1$ mm.
+#
+# ## The cone
+#
+# Coulomb's forces fill the cone $|r_t| \le \mu r_n$. While the coefficient grows, the cone opens. The force moves along its
+# edge, until the cone has reached the sticking force $-Kq$.
+
+
+# %%
+def in_the_cone(coefficient):
+    force = solve(InterfaceProblem(Q, [q], coefficient)).reactions[0]
+    slip = (Q @ force + q)[1]
+    fig, ax = plt.subplots(figsize=(5, 3.4), layout="constrained")
+    ax.fill([0, -coefficient * 4, coefficient * 4], [0, 4, 4], color="C0", alpha=0.15, lw=0)
+    ax.annotate("", (force[1], force[0]), (0, 0), arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2})
+    ax.plot(*(-K @ q)[::-1], "kx")
+    ax.text(-2.0, 0.7, "sticking force", ha="center")
+    ax.set(xlim=(-3.2, 3.2), ylim=(0, 3.2), xlabel="friction force $r_t$ [N]", ylabel="normal force $r_n$ [N]")
+    ax.set_title(rf"$\mu$ = {coefficient:.2f}: " + (f"slips {slip:.2f} mm" if slip > 1e-8 else "sticks"))
+    return fig
+
+
+Slider("friction coefficient [-]", np.linspace(0, 2.5, 11), in_the_cone, start=2)
+
+# %% [markdown]
+# ## The convex relaxation: another law
+#
+# Let us write the cone into the program all the same:
+#
+# $$ \min \; \tfrac12 r' Q r + q' r \qquad \text{subject to} \qquad |r_t| \le \mu\, r_n . $$
+#
+# This is a *second-order cone program*, and convex. But the multiplier of the cone has a normal part: a node that slips by
+# $u_t$ is lifted by $\mu |u_t|$. This law is called *associated friction*.
+
+# %%
+f = cp.Variable(2)
+energy = cp.quad_form(f, cp.psd_wrap(Q)) / 2 + q @ f
+cp.Problem(cp.Minimize(energy), [cp.SOC(mu * f[0], f[1:])]).solve(solver=cp.CLARABEL)
+lifted = Q @ f.value + q
+print(f"associated: force {np.round(f.value, 3)}, gap {lifted[0]:.3f} mm, slip {lifted[1]:.3f} mm")
+
+assert np.isclose(lifted[0], mu * abs(lifted[1]), atol=1e-4) and lifted[0] > 0.1
+
+# %% [markdown]
+# Acary and Cadoux repair it. They add $\mu s\, r_n$ to the cost, where $s$ is the slip of the last answer, and repeat. At the
+# end the shift has removed the lift.
+#
+# ## What fails
+#
+# **The iteration.** With $\mu = 1.5$ the node still has exactly one solution. In Tresca's iteration the new normal force is
+# $r_n = 3 - g$, so that the next bound is $\mu (3 - g)$: an error is multiplied by $-\mu$, and for $\mu > 1$ it grows.
+
+# %%
+much, g, history = 1.5, 1.0, []
+for _ in range(12):
+    r = dual(g)
+    g = much * max(r[0], 0.0)
+    history.append(r[0])
+exact = all_solutions(InterfaceProblem(Q, [q], much))
+fig, ax = plt.subplots(figsize=(5, 3.2), layout="constrained")
+ax.plot(range(1, 13), history, "o-", label="Tresca's iteration")
+ax.axhline(exact[0].reactions[0, 0], color="k", ls="--", lw=1, label="the only solution")
+ax.set(xlabel="iteration [-]", ylabel="normal force [N]")
+ax.legend(frameon=False)
+
+assert len(exact) == 1 and np.allclose(exact[0].reactions, [[1.2, -1.8]])
+assert abs(history[-1] - 1.2) > 0.1  # it has not converged
+assert solve(InterfaceProblem(Q, [q], much)).solved  # another method has
+
+# %% [markdown]
+# **Uniqueness.** If the node slips to the *left*, friction pushes it to the right with $r_t = +\mu r_n$, and the coupling
+# draws it down: $u_n = (Q_{nn} + \mu Q_{nt})\, r_n + q_n = (1 - \mu)\, r_n + q_n$. For $\mu > 1$ a larger force comes with a
+# *smaller* gap. The node can wedge itself in. From $\mu = Q_{nn} / |Q_{nt}| = 1$ on there are loads with several solutions.
+
+# %%
+wedged = InterfaceProblem(Q, [[0.1, -0.5]], 1.5)
+for found in all_solutions(wedged):
+    state = Q @ found.reactions[0] + wedged.q[0]
+    print(f"force {np.round(found.reactions[0], 4)}, gap {state[0]:.3f} mm, slip {state[1]:+.3f} mm")
+
+assert len(all_solutions(wedged)) == 3
+assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
+
+# %% [markdown]
+# The node may hang freely, stick, or slip, all under the same load. Which of them happens depends on its history, and no
+# static law can tell.
+#
+# ## Exercises
+#
+# **2.1** (Pen and paper.) Let $Q = \operatorname{diag}(1, 2)$, $q = (-1, 1)$ and $\mu = 0.3$. Find the two forces.
+
+# %% tags=["exercise"]
+answer = ...  # (r_n, r_t) in N
+
+# %% [markdown] tags=["solution"]
+# Nothing couples the directions, so $r_n = -q_n / Q_{nn} = 1$. Sticking would need $r_t = -q_t / Q_{tt} = -0.5$, more than
+# friction can give. So the node slips to the right, $r_t = -0.3$, and $u_t = 1 - 0.6 = 0.4$ mm.
+
+# %% tags=["solution"]
+answer = (1.0, -0.3)
+
+# %%
+check("2.1", answer, (1.0, -0.3))
+
+# %% [markdown]
+# **2.2** (Pen and paper.) From which friction coefficient on does the node of this chapter stick?
+
+# %% tags=["exercise"]
+answer = ...
+
+# %% [markdown] tags=["solution"]
+# Sticking means $u = 0$, so $r = -K q = (1, -2)$. The cone holds this force if $\mu \ge 2$.
+
+# %% tags=["solution"]
+answer = 2.0
+
+# %%
+check("2.2", answer, 2.0)
+
+# %% [markdown]
+# **2.3** Write the iteration of Acary and Cadoux and solve the case $\mu = 1.5$, in which Tresca's iteration failed. The
+# certificate grades your forces.
+
+# %% tags=["exercise"]
+answer = ...  # (r_n, r_t) in N
+
+# %% tags=["solution"]
+x, shift = cp.Variable(2), cp.Parameter(nonneg=True, value=0.0)
+cost = cp.quad_form(x, cp.psd_wrap(Q)) / 2 + q @ x + 1.5 * shift * x[0]
+program = cp.Problem(cp.Minimize(cost), [cp.SOC(1.5 * x[0], x[1:])])
+for _ in range(60):  # an error shrinks by .7 each time
+    program.solve(solver=cp.CLARABEL)
+    shift.value = abs(float((Q @ x.value + q)[1]))
+answer = x.value
+
+# %%
+check("2.3", answer, InterfaceProblem(Q, [q], 1.5))
+
+# %% [markdown]
+# **2.4** (Pen and paper.) Find the three solutions of the wedged node, $q = (0.1, -0.5)$ and $\mu = 1.5$, by trying the
+# states: open, stick, slip to the left. Give their normal forces in ascending order.
+
+# %% tags=["exercise"]
+answer = ...  # three numbers [N]
+
+# %% [markdown] tags=["solution"]
+# *Open:* $r = 0$ and $u = q$ has $u_n = 0.1 \ge 0$. *Stick:* $r = -K q = (0.3, 0.4)$, and $0.4 \le 1.5 \cdot 0.3$. *Slip to the
+# left:* $u_n = (1 - 1.5)\, r_n + 0.1 = 0$ gives $r_n = 0.2$, $r_t = 0.3$, and $u_t = -0.2 + 0.6 - 0.5 = -0.1 < 0$, as assumed.
+
+# %% tags=["solution"]
+answer = (0.0, 0.2, 0.3)
+
+# %%
+check("2.4", answer, (0.0, 0.2, 0.3))
+
+# %% [markdown]
+# ## References
+#
+# - G. De Saxcé, Z.-Q. Feng, The bipotential method: a constructive approach to design the complete contact law with friction,
+#   *Math. Comput. Modelling* 28 (1998), [doi:10.1016/S0895-7177(98)00119-8](https://doi.org/10.1016/S0895-7177(98)00119-8).
+# - V. Acary, F. Cadoux, C. Lemaréchal, J. Malick, A formulation of the linear discrete Coulomb friction problem via convex
+#   optimization, *ZAMM* 91 (2011), [doi:10.1002/zamm.201000073](https://doi.org/10.1002/zamm.201000073).
+#
+# Next: [many nodes without friction](chapter_3_a_string_on_a_floor.py).
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script

@@ -1,0 +1,287 @@
+# %% [markdown]
+# # Chapter 5. Coulomb friction on an interface
+#
+# We put together what we have: many nodes, bodies, and Coulomb's law. No energy has its minimum at the solution. All methods
+# therefore solve another, simpler problem again and again. We write three of them, compare their speed with their accuracy,
+# and look at problems that have no solution at all.
+#
+# You need: chapters 2 and 4. Time: 50 minutes with the exercises.
+
+# %%
+import time
+
+import cvxpy as cp
+import matplotlib.pyplot as plt
+import numpy as np
+
+from contactopt import InterfaceProblem, diagnose, natural_map_residual, reduce, scenes, solve
+from contactopt.teaching import Slider, check
+
+# %% [markdown]
+# ## The mechanical system
+#
+# A rubber block, 40 mm wide and 40 mm high, is pressed on a foundation of the same rubber with 100 N. Both spread under the
+# load, the foundation less than the block. Friction resists the difference. We use the right half; the tangent points
+# outwards.
+
+# %%
+mu = 0.2
+problem = reduce(scenes.flat_punch(2, mu=mu, elements=24))
+Q, q, V, s = problem.Q, problem.q.ravel(), problem.V, problem.s
+k = problem.contacts
+moves = np.diag(Q) > 0  # the node on the axis of symmetry cannot move sideways: its row of Q is zero
+
+fig, ax = plt.subplots(figsize=(5, 3.4), layout="constrained")
+ax.fill([0, 20, 20, 0], [0, 0, 40, 40], color="C0", alpha=0.25, lw=0)
+ax.fill([0, 45, 45, 0], [0, 0, -25, -25], color="C1", alpha=0.25, lw=0)
+ax.plot([0, 0], [-25, 44], "k-.", lw=0.8)
+ax.annotate("", (10, 40), (10, 50), arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2})
+for head, name in (((40, 6), "$t$"), ((28, 18), "$n$")):
+    ax.annotate("", head, (28, 6), arrowprops={"arrowstyle": "-|>", "color": "k"})
+    ax.text(head[0] + 1, head[1] + 1, name)
+ax.plot(problem.coordinates[0], problem.coordinates[1], "k.", ms=3)
+ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48))
+
+print(f"{k} contacts, V {V.shape}: one plate, s = {s} N")
+
+# %% [markdown]
+# ## Primal and dual for a given bound
+#
+# For given friction bounds $g$ there is a primal energy, in the displacements $u$ of the contact and the motion $\lambda$ of
+# the plate. With $S = Q^{-1}$ it is
+#
+# $$ \min_{u_n \ge 0,\; \lambda} \; \tfrac12 (u - q - V\lambda)' S\, (u - q - V \lambda) - s' \lambda + \sum_i g_i |u_{t,i}| , $$
+#
+# and its dual is $\min \tfrac12 r' Q r + q' r$ under $r_n \ge 0$, $|r_t| \le g$ and $V' r + s = 0$. The optimality conditions of
+# both are Signorini's conditions, friction with the bound $g$, and equilibrium of the plate.
+
+# %%
+n, t = slice(0, None, 2), slice(1, None, 2)
+r = cp.Variable(2 * k)
+g = cp.Parameter(k, nonneg=True)
+balance = V.T @ r + s == 0
+dual = cp.Problem(cp.Minimize(cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r), [r[n] >= 0, cp.abs(r[t]) <= g, balance])
+
+u, plate = cp.Variable(2 * k), cp.Variable(V.shape[1])
+S = np.linalg.inv(Q[np.ix_(moves, moves)])
+stretch = u - q - V @ plate
+energy = cp.quad_form(stretch[moves], cp.psd_wrap((S + S.T) / 2)) / 2 - s @ plate + g @ cp.abs(u[t])
+primal = cp.Problem(cp.Minimize(energy), [u[n] >= 0, u[~moves] == q[~moves]])
+
+g.value = np.full(k, 0.5)
+dual.solve(solver=cp.CLARABEL)
+primal.solve(solver=cp.CLARABEL)
+
+assert np.isclose(primal.value, -dual.value, rtol=1e-5)
+assert np.allclose(S @ (u.value - q - V @ plate.value)[moves], r.value[moves], atol=1e-2)
+
+# %% [markdown]
+# ## Method 1: Tresca's iteration
+#
+# Solve for a bound, set $g = \mu r_n$, and repeat. Each step is one QP. The certificate falls by the same factor in every
+# step, until the accuracy of the QP solver ends it.
+
+# %%
+g.value, road = np.zeros(k), []
+for _ in range(8):
+    dual.solve(solver=cp.CLARABEL)
+    g.value = mu * np.maximum(r.value[n], 0)
+    road.append(natural_map_residual(problem, r.value.reshape(-1, 2)))
+print("Tresca's iteration:", " ".join(f"{value:.0e}" for value in road))
+
+assert road[-1] < 1e-4 and road[3] < road[1]
+
+# %% [markdown]
+# ## Method 2: Newton on the states
+#
+# If we knew which nodes are open, stick or slip, everything would be linear: $r = 0$ at open nodes, $u = 0$ at sticking ones,
+# and $u_n = 0$, $r_t = \mp \mu r_n$ at slipping ones. Newton's method guesses the states from the last answer: a node is
+# pressed if $r_n - \rho u_n > 0$, and it slips if $|r_t - \rho u_t|$ exceeds $\mu$ times that.
+
+
+# %%
+def newton(rho=1.0, steps=20):
+    r, lam = np.zeros(2 * k), np.zeros(V.shape[1])
+    for step in range(1, steps + 1):
+        u = Q @ r + V @ lam + q
+        pressed = np.maximum(r[n] - rho * u[n], 0) if step > 1 else np.ones(k)
+        trial = r[t] - rho * u[t] if step > 1 else np.zeros(k)
+        slips = (np.abs(trial) > mu * pressed) & (pressed > 0)
+        # rows of A r + B u = 0: one normal and one tangential equation for every node
+        A, B = np.zeros((2 * k, 2 * k)), np.zeros((2 * k, 2 * k))
+        for i in range(k):
+            if pressed[i] == 0:
+                A[2 * i, 2 * i] = A[2 * i + 1, 2 * i + 1] = 1
+            elif slips[i]:
+                B[2 * i, 2 * i] = A[2 * i + 1, 2 * i + 1] = 1
+                A[2 * i + 1, 2 * i] = -mu * np.sign(trial[i])
+            else:
+                B[2 * i, 2 * i] = B[2 * i + 1, 2 * i + 1] = 1
+        B[~moves], A[~moves] = 0, np.eye(2 * k)[~moves]  # no friction on the axis of symmetry
+        system = np.block([[A + B @ Q, B @ V], [V.T, np.zeros((V.shape[1],) * 2)]])
+        r, lam = np.split(np.linalg.solve(system, -np.concatenate([B @ q, s])), [2 * k])
+        if natural_map_residual(problem, r.reshape(-1, 2), lam) < 1e-12:
+            return r, step
+    return r, steps
+
+
+forces, steps = newton()
+print(f"Newton: {steps} steps, certificate {natural_map_residual(problem, forces.reshape(-1, 2)):.0e}")
+
+assert steps < 20 and np.allclose(forces, solve(problem, tol=1e-12).reactions.ravel(), atol=1e-8)
+
+# %% [markdown]
+# Once the states are right, the last step is exact. That is why Newton's method ends at the rounding error, and the fixed-point
+# iteration does not.
+#
+# ## Method 3: a cone program with a shift
+#
+# Acary and Cadoux minimise over the cones themselves, $|r_t| \le \mu r_n$, with the term $\mu |u_t| r_n$ in the cost, and repeat
+# with the new slip. contactopt calls it `acary_cadoux`. The same program serves in 3D, where the cones are round.
+#
+# ## Penalty and multipliers
+#
+# Both can also replace the constraints. The penalty method makes an error of the size $1 / \kappa$. The *augmented Lagrangian*
+# adds the last contact force to the spring, and removes this error by repetition, with a moderate $\kappa$.
+
+# %%
+fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
+for name, label in (
+    ("newton", "Newton"),
+    ("tresca", "Tresca's iteration"),
+    ("acary_cadoux", "cones with a shift"),
+    ("augmented_lagrangian", "augmented Lagrangian"),
+    ("nsgs", "node by node (Gauss-Seidel)"),
+):
+    points = []
+    for tol in (1e-2, 1e-4, 1e-6, 1e-8):
+        begin = time.perf_counter()
+        found = solve(problem, name, tol=tol, time_limit=3.0)
+        points.append((time.perf_counter() - begin, max(found.residual, 1e-14)))
+    ax.semilogy(*np.transpose(points), "o-", mfc="none", label=label)
+ax.set(xlabel="time [s]", ylabel="certificate [-]")
+ax.legend(frameon=False, fontsize=8)
+
+assert solve(problem, "augmented_lagrangian").solved
+errors = [solve(problem, "penalty", factor=10.0**j).residual for j in (1, 2, 3)]
+assert errors[0] > 5 * errors[1] > 25 * errors[2]
+
+# %% [markdown]
+# A chart like this one is the only fair way to compare methods: *how long does it take until the same certificate is
+# reached?* The times are those of the machine that drew the figure.
+#
+# ## What more friction does
+
+
+# %%
+def with_friction(coefficient):
+    answer = solve(InterfaceProblem(Q, problem.q, coefficient, V, s))
+    pressure, shear = (answer.reactions / problem.areas[:, None]).T
+    fig, ax = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
+    ax.plot(problem.coordinates[0], coefficient * pressure, "k--", lw=1, label=r"$\mu\, p$")
+    ax.plot(problem.coordinates[0], -shear, "C1.-", label="friction, inwards")
+    ax.set(xlabel="x [mm]", ylabel="stress [MPa]", ylim=(-0.005, 0.06), title=rf"$\mu$ = {coefficient:.2f}")
+    ax.legend(frameon=False, loc="upper left")
+    return fig
+
+
+Slider("friction coefficient [-]", np.linspace(0, 0.6, 9), with_friction, start=3)
+
+# %% [markdown]
+# Where the two curves meet, the nodes slip. With more friction the slip zone shrinks towards the edge, and in the end all
+# nodes stick.
+#
+# ## What fails: no solution
+#
+# A rigid sledge stands on two runners and is pressed down with 100 N. Somebody pulls it sideways with 25 N. Rigid bodies have
+# no compliance, $Q = 0$. The forces of the two runners have to balance the load, within the friction cones. With $\mu = 0.2$
+# they cannot: the sledge slides away, and there is no static solution. contactopt finds a proof of that, and says
+# `infeasible`.
+
+# %%
+motions = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 1.0]])  # both runners move up, or sideways
+pulled = np.array([-100.0, 25.0])  # N: the load in these two motions
+for coefficient in (0.2, 0.3):
+    sledge = InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), coefficient, motions, pulled)
+    print(f"mu = {coefficient}: {solve(sledge).status}")
+
+assert str(solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.2, motions, pulled)).status) == "infeasible"
+assert solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.3, motions, pulled)).solved
+
+# %% [markdown]
+# ## Exercises
+#
+# **5.1** (Pen and paper.) From which friction coefficient on can the sledge stand still?
+
+# %% tags=["exercise"]
+answer = ...
+
+# %% [markdown] tags=["solution"]
+# The two runners carry 100 N together, so friction can hold $100 \mu$. It has to hold 25 N: $\mu = 0.25$.
+
+# %% tags=["solution"]
+answer = 0.25
+
+# %%
+check("5.1", answer, 0.25)
+
+# %% [markdown]
+# **5.2** The load of the sledge is moved forward, so that the front runner carries 80 N and the back one 20 N. The front runner
+# stands on ice, with $\mu = 0.05$, and the back one on stone, with $\mu = 0.5$. Write a linear program for the largest pull
+# that the sledge withstands.
+
+# %% tags=["exercise"]
+answer = ...  # N
+
+# %% [markdown] tags=["solution"]
+# By hand: $0.05 \cdot 80 + 0.5 \cdot 20 = 14$ N.
+
+# %% tags=["solution"]
+pull, friction = cp.Variable(), cp.Variable(2)
+limits = np.array([0.05 * 80, 0.5 * 20])
+cp.Problem(cp.Maximize(pull), [cp.abs(friction) <= limits, pull == cp.sum(friction)]).solve(solver=cp.CLARABEL)
+answer = float(pull.value)
+
+# %%
+check("5.2", answer, 14.0)
+
+# %% [markdown]
+# **5.3** How many nodes of the block slip with $\mu = 0.2$? Count them in the answer of Newton's method.
+
+# %% tags=["exercise"]
+answer = ...
+
+# %% tags=["solution"]
+answer = int(np.sum((np.abs(forces[t]) > mu * forces[n] * (1 - 1e-9)) & (forces[n] > 0)))
+
+# %%
+check("5.3", answer, diagnose(problem, solve(problem)).local.slip)
+
+# %% [markdown]
+# **5.4** Measure the factor by which the certificate of Tresca's iteration falls from one step to the next. (Take a tolerance of
+# $10^{-13}$ with `solve(problem, "tresca", tol=1e-13)` and look at `history`.) `diagnose` predicts it.
+
+# %% tags=["exercise"]
+answer = ...
+
+# %% tags=["solution"]
+history = [entry["residual"] for entry in solve(problem, "tresca", tol=1e-13).history]
+answer = (history[8] / history[4]) ** (1 / 4)
+
+# %%
+predicted = diagnose(problem, solve(problem)).local.tresca_rate
+check("5.4", answer, lambda rate: abs(rate / predicted - 1) < 0.05)
+
+# %% [markdown]
+# ## References
+#
+# - P. Alart, A. Curnier, A mixed formulation for frictional contact problems prone to Newton like solution methods, *Comput.
+#   Methods Appl. Mech. Eng.* 92 (1991), [doi:10.1016/0045-7825(91)90022-X](https://doi.org/10.1016/0045-7825(91)90022-X).
+# - V. Acary, M. Brémond, O. Huber, On solving contact problems with Coulomb friction: formulations and numerical comparisons,
+#   in: *Advanced Topics in Nonsmooth Dynamics*, Springer 2018,
+#   [doi:10.1007/978-3-319-75972-2_10](https://doi.org/10.1007/978-3-319-75972-2_10).
+#
+# Next: [large problems in three dimensions](chapter_6_large_and_three_dimensional.py).
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script
