@@ -27,7 +27,7 @@ from contactopt.interface.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution, alone, part_of
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.scenes import PATHS, make_path, make_scene
-from contactopt.scenes.scene import HalfSpace, Scene
+from contactopt.scenes.scene import HalfSpace, Part, Scene
 from contactopt.solving.methods import default_method, find_method
 
 if TYPE_CHECKING:
@@ -139,6 +139,9 @@ def run(
     form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
     options = Options(form, choose("solver", solver, "auto"), chosen, choose("tol", tol, 1e-8), note=note)
     if team is not None:
+        idle = team.size - sum(isinstance(part, Part) for part in states[-1].parts)
+        if idle > 0:
+            note(f"{idle} of {team.size} ranks have nothing to do: there are no more elastic bodies")
         states = tuple(spread(state, team) for state in states)
     try:
         return _finish(states, out, method, backends, options, accuracy, quantity, start)

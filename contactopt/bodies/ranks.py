@@ -215,11 +215,15 @@ def _portable(error: Exception) -> Exception:
         return RuntimeError(f"{type(error).__name__}: {error}")
 
 
-def _packed(message: Any) -> bytes:
-    """Functions that have no name, such as the meshes of scenes, travel by their code."""
+def shipped(message: Any) -> bytes:
+    """Anything as bytes; functions that have no name, such as those that make the meshes of scenes, travel by their code."""
     import cloudpickle
 
     return bytes(cloudpickle.dumps(message))
+
+
+def _packed(message: Any) -> bytes:
+    return pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
 
 
 def _send(comm: Any, lock: threading.Lock, data: bytes, rank: int, tag: int) -> None:

@@ -8,6 +8,7 @@ these unknowns come back. A displacement of the whole body is kept on its rank a
 from __future__ import annotations
 
 import operator
+import pickle
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,7 +20,7 @@ import scipy.sparse as sp
 from contactopt.bodies.elastic import AssembledElastic, ElasticBody, assemble_elastic
 from contactopt.bodies.fields import Fields
 from contactopt.bodies.protocol import Surface
-from contactopt.bodies.ranks import Kept, RemotePart, Team, values_of
+from contactopt.bodies.ranks import Kept, RemotePart, Team, shipped, values_of
 from contactopt.errors import InputError
 from contactopt.problem.coupled import LocalTerm
 from contactopt.problem.operators import Product
@@ -27,7 +28,7 @@ from contactopt.problem.stacked import dot
 from contactopt.scenes.scene import Part, Scene
 
 
-def _sent(scene: Scene, part: Part) -> tuple[Scene, Part]:
+def _sent(scene: Scene, part: Part) -> bytes:
     """Scene and part as their rank needs them: without the meshes of the other bodies."""
 
     def change(other: Any) -> Any:
@@ -36,7 +37,7 @@ def _sent(scene: Scene, part: Part) -> tuple[Scene, Part]:
         values = values_of(other)
         return Part(**(values if other.name == part.name else values | {"mesh": None, "curve": None}))
 
-    return replace(scene.with_parts(change), reference=None), Part(**values_of(part))
+    return shipped((replace(scene.with_parts(change), reference=None), Part(**values_of(part))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +122,12 @@ def _skin(assembled: AssembledElastic) -> np.ndarray:
     return np.sort(assembled.body.contact_dofs, axis=None)
 
 
-def _surface(assembled: AssembledElastic, name: str | None) -> Surface:
+def _assembled(sent: bytes, elements: int, zone: float | None) -> AssembledElastic:
+    scene, part = pickle.loads(sent)
+    return assemble_elastic(scene, part, elements, zone)
+
+
+def _surface(assembled: AssembledElastic, name: str | None) -> bytes:
     """The surface in terms of the contact unknowns alone, and its mesh by the nodes of the contact surfaces alone."""
     body, skin, whole = assembled.body, _skin(assembled), assembled.surface(name)
     place = np.full(len(body.load), -1)
@@ -141,7 +147,7 @@ def _surface(assembled: AssembledElastic, name: str | None) -> Surface:
         unknowns=place[whole.mesh.unknowns[:, nodes]],
         held=whole.mesh.held[skin],
     )
-    return replace(whole, traces=traces, mesh=mesh)
+    return shipped(replace(whole, traces=traces, mesh=mesh))
 
 
 def _sizes(assembled: AssembledElastic) -> tuple[int, int]:
@@ -218,8 +224,8 @@ def _fields(own: Resident, U: np.ndarray) -> Fields:
     return own.body.fields(U)
 
 
-def _loaded(own: Resident, scene: Scene, part: Part) -> Resident:
-    return replace(own, body=own.body.loaded(scene, part))
+def _loaded(own: Resident, sent: bytes) -> Resident:
+    return replace(own, body=own.body.loaded(*pickle.loads(sent)))
 
 
 # ---- on rank 0 ----
@@ -362,7 +368,7 @@ class RemoteBody:
         return found
 
     def loaded(self, scene: Scene, part: Part) -> RemoteBody:
-        return _known(self.team, self._keep(_loaded, *_sent(scene, part)))
+        return _known(self.team, self._keep(_loaded, _sent(scene, part)))
 
 
 def _known(team: Team, kept: Kept) -> RemoteBody:
@@ -398,7 +404,7 @@ class AssembledRemote:
         return bool(self._ask(AssembledElastic.iterates, solver))
 
     def surface(self, name: str | None = None) -> Surface:
-        found: Surface = self._ask(_surface, name)
+        found: Surface = pickle.loads(self._ask(_surface, name))
         return found
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
@@ -412,5 +418,5 @@ def assemble_remote(scene: Scene, part: RemotePart, elements: int, zone: float |
     """A RemotePart of a scene, assembled on its rank."""
     team = part.team
     assert team is not None
-    kept = team.keep(part.rank, assemble_elastic, *_sent(scene, part), elements, zone)
+    kept = team.keep(part.rank, _assembled, _sent(scene, part), elements, zone)
     return AssembledRemote(team, kept, part.name)

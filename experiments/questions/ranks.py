@@ -23,9 +23,9 @@ from experiments.report import write
 TOL = 1e-8
 # case -> dimension, elements across the contact half-width, options
 EQUAL = {
-    "plane, factors": (2, 320, {"Q": "implicit", "solver": "superlu"}),
-    "solid, factors": (3, 12, {"Q": "explicit", "solver": "superlu"}),
-    "solid, multigrid": (3, 20, {"solver": "multigrid"}),
+    "plane, factors": (2, 1024, {"Q": "implicit", "solver": "superlu"}),
+    "solid, factors": (3, 20, {"Q": "explicit", "solver": "superlu"}),
+    "solid, multigrid": (3, 44, {"solver": "multigrid"}),
 }
 RANKS = (4, 8, 16)
 HEIGHTS = (80.0, 1280.0)  # of the foundation that is cut into slices [mm]
