@@ -322,19 +322,20 @@ def _operator(
         return Convolution(sum(known[1:], known[0]))
     moved = [body.moved(B) for body, B in zip(bodies, maps)]
     moving = [(body, B, _rows(B)) for body, B, moves in zip(bodies, maps, moved) if moves.any()]
-    terms = [(body.product(B[rows]), rows, body.parallel) for body, B, rows in moving]
-    parallel = [marked for *_, marked in terms]
+    parallel = [body.parallel for body, *_ in moving]
+    acts = each(lambda term: term[0].product(term[1][term[2]]), moving, parallel)
+    terms = [(act, rows) for act, (*_, rows) in zip(acts, moving)]
 
     def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
-        def moves(term: tuple[Product, np.ndarray, bool]) -> tuple[np.ndarray, np.ndarray]:
+        def moves(term: tuple[Product, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
             """The columns that load a body at all, and what they make of it."""
-            act, rows, _ = term
+            act, rows = term
             load = X[rows]
             columns = np.flatnonzero(load.any(axis=0)) if len(couplings) > 1 else np.arange(X.shape[1])
             return columns, act(load[:, columns], accuracy) if len(columns) else load[:, columns]
 
         out = np.zeros(X.shape)
-        for (_, rows, _), (columns, own) in zip(terms, each(moves, terms, parallel)):
+        for (_, rows), (columns, own) in zip(terms, each(moves, terms, parallel)):
             out[np.ix_(rows, columns)] += own
         return out
 
