@@ -9,12 +9,11 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from contactopt import Scene, scenes
+from contactopt import Scene, reduce, reduce_bodies, scenes, solve
 from contactopt.analysis.solve_scene import Options, Solved, solve_scene
 from contactopt.bodies.ranks import Kept, Team, mpiexec, serve, spread, world
 from contactopt.scenes.slices import sliced
@@ -28,7 +27,8 @@ EQUAL = {
     "solid, multigrid": (3, 56, {"solver": "multigrid"}),
 }
 RANKS = (4, 8, 16)
-HEIGHTS = (80.0, 1280.0)  # of the foundation that is cut into slices [mm]
+HEIGHTS = (80.0, 640.0)  # of the foundation that is cut into slices [mm]
+SLICED = 12  # elements across the contact half-width there
 
 
 def equal_bodies(dim: int, elements: int) -> Scene:
@@ -131,33 +131,49 @@ def efficiency(team: Team, case: str) -> dict[str, Any]:
     }
 
 
-def traffic(team: Team, height: float, solver: str) -> dict[str, Any]:
-    """One slice of the foundation, or the punch, on each rank: what a solve sends, after the set-up."""
-    from contactopt import reduce_bodies, solve
-
-    scene = sliced(scenes.flat_punch(2, elements=24, foundation_height=height), "foundation", team.size - 1)
-    one = reduce_bodies(scene, Q="implicit", solver=solver)
-    many = reduce_bodies(spread(scene, team), Q="implicit", solver=solver)
-    expected = solve(one.problem, tol=TOL)
+def traffic(team: Team, height: float) -> dict[str, Any]:
+    """One slice of the foundation, or the punch, on each rank: what a product with Q sends, and the answer."""
+    scene = sliced(scenes.flat_punch(2, elements=SLICED, foundation_height=height), "foundation", team.size - 1)
+    one, many = (reduce_bodies(given, Q="implicit", solver="superlu") for given in (scene, spread(scene, team)))
+    r = np.random.default_rng(0).normal(size=many.problem.q.size)
+    expected = one.problem.Q @ r
     before = (team.traffic.messages, team.traffic.length)
-    found = solve(many.problem, tol=TOL)
+    product = many.problem.Q @ r
     sent = (team.traffic.messages - before[0], team.traffic.length - before[1])
-    form = many.problem.Q.coupled
-    work = many.problem.Q.products + (0 if form is None else form.cycles)
-    size = np.abs(expected.reactions).max()
+    answers = [solve(reduce(given, Q="explicit"), tol=TOL) for given in (scene, spread(scene, team))]
+    size = np.abs(answers[0].reactions).max()
     return {
         "ranks": team.size,
-        "solver": solver,
         "unknowns of the bodies": many.dofs,
         "interface unknowns": many.problem.q.size,
-        "difference": float(np.abs(found.reactions - expected.reactions).max() / size),
-        "steps": found.iterations,
-        "products and V-cycles": work,
-        "messages": sent[0],
-        "messages per step": sent[0] / max(found.iterations, 1),
-        "bytes per step": sent[1] / max(found.iterations, 1),
-        "messages per product and rank": sent[0] / max(work, 1) / (team.size - 1),
-        "bytes per message": sent[1] / max(sent[0], 1),
+        "messages per product": sent[0],
+        "bytes per product": sent[1],
+        "products differ by": float(np.abs(product - expected).max() / np.abs(expected).max()),
+        "steps": f"{answers[0].iterations}, {answers[1].iterations}",
+        "residuals": f"{answers[0].residual:.1e}, {answers[1].residual:.1e}",
+        "answers differ by": float(np.abs(answers[0].reactions - answers[1].reactions).max() / size),
+    }
+
+
+def coupled_traffic(team: Team, height: float) -> dict[str, Any]:
+    """The same bodies solved by multigrid: what the whole solution sends."""
+    scene = sliced(scenes.flat_punch(2, elements=SLICED, foundation_height=height), "foundation", team.size - 1)
+    problem = reduce(spread(scene, team), solver="multigrid")
+    before = (team.traffic.messages, team.traffic.length)
+    solution = solve(problem, "newton", tol=TOL)
+    sent = (team.traffic.messages - before[0], team.traffic.length - before[1])
+    bodies, cycles = team.size - 1, problem.Q.coupled.cycles
+    return {
+        "ranks": team.size,
+        "unknowns of the bodies": sum(term.size for term in problem.Q.coupled.terms),
+        "interface unknowns": problem.q.size,
+        "steps": solution.iterations,
+        "residual": float(solution.residual),
+        "V-cycles": cycles,
+        "messages per step": sent[0] / solution.iterations,
+        "bytes per step": sent[1] / solution.iterations,
+        "messages per V-cycle and rank": sent[0] / cycles / bodies,
+        "bytes per message": sent[1] / sent[0],
     }
 
 
@@ -176,11 +192,15 @@ other programs used at the same time.
 ## What travels
 
 A punch on a foundation that is cut into slices tied to each other, one body on each rank; more ranks than cores. The
-higher foundation has more unknowns within its slices and the same interfaces. Counted is the solution after the set-up.
-With factors, a product with Q is one order to each rank and its reply. With multigrid the displacements stay on their ranks: the steps
-of the Krylov method send an order for each operation on them, and receive scalar products and traces on the interface.
+higher foundation has more unknowns within its slices and the same interfaces. With factors, a product with Q is one order to each
+rank and its reply; an array Q is made once, and the steps send nothing.
 
 {traffic}
+
+With multigrid the displacements stay on their ranks. The steps of the Krylov method send an order for each operation on them, and
+receive scalar products and traces on the interface:
+
+{coupled}
 """
 
 
@@ -188,36 +208,45 @@ def work(out: str) -> None:
     """On the ranks: the tables of as many ranks as there are."""
     comm = world()
     if comm.rank:
-        from experiments.questions import ranks as module  # orders name its functions by this name, not by __main__
-
         serve(comm)
-        del module
         return
-    from experiments.questions.ranks import TimedTeam, efficiency, traffic
+    from experiments.questions import ranks  # orders name its functions by this name, not by __main__
 
-    team = TimedTeam(comm)
+    team = ranks.TimedTeam(comm)
     try:
+        tables: dict[str, list[dict[str, Any]]] = {"efficiency": [], "traffic": [], "coupled": []}
         if comm.size == 2:
-            rows = [efficiency(team, case) for case in EQUAL]
+            tables["efficiency"] = [ranks.efficiency(team, case) for case in EQUAL]
         else:
-            rows = [traffic(team, height, solver) for solver in ("superlu", "multigrid") for height in HEIGHTS]
-        Path(out).write_text(json.dumps(rows))
+            tables["traffic"] = [ranks.traffic(team, height) for height in HEIGHTS]
+        if comm.size == RANKS[0]:
+            tables["coupled"] = [ranks.coupled_traffic(team, height) for height in HEIGHTS]
+        Path(out).write_text(json.dumps(tables))
     finally:
         team.dismiss()
 
 
-def measured(ranks: int) -> list[dict[str, Any]]:
-    with TemporaryDirectory() as folder:
-        out = Path(folder) / "rows.json"
+def measured(ranks: int) -> dict[str, list[dict[str, Any]]]:
+    """The tables of one launch, kept in out/ranks/ until all are there."""
+    out = Path("out", "ranks", f"{ranks}.json")
+    if not out.exists():
+        out.parent.mkdir(parents=True, exist_ok=True)
         command = [*mpiexec(ranks), sys.executable, "-m", "experiments.questions.ranks", str(out)]
         subprocess.run(command, check=True)
-        rows: list[dict[str, Any]] = json.loads(out.read_text())
-        return rows
+    tables: dict[str, list[dict[str, Any]]] = json.loads(out.read_text())
+    return tables
 
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
         work(sys.argv[1])
     else:
-        tables = {"efficiency": measured(2), "traffic": [row for ranks in RANKS for row in measured(ranks)]}
-        write("ranks", "Bodies on ranks of their own", TEXT, tables, {})
+        launches = [measured(ranks) for ranks in (2, *RANKS)]
+        names = ("efficiency", "traffic", "coupled")
+        write(
+            "ranks",
+            "Bodies on ranks of their own",
+            TEXT,
+            {n: [row for made in launches for row in made[n]] for n in names},
+            {},
+        )
