@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from contactopt.analysis.paths import PathResult, follow
     from contactopt.analytic import Reference
     from contactopt.bodies.fields import Fields
+    from contactopt.derivatives.design import Design, design
+    from contactopt.derivatives.fit import Fit, fit
+    from contactopt.derivatives.gradient import gradient
+    from contactopt.derivatives.interface import sensitivity
     from contactopt.errors import BackendError, InputError
     from contactopt.interface.reduction import reduce, reduce_bodies
     from contactopt.material import Material
@@ -37,6 +41,10 @@ _HOMES = {
     "analysis.diagnosis": ("Diagnosis", "diagnose"),
     "analysis.enumeration": ("all_solutions",),
     "analysis.paths": ("PathResult", "follow"),
+    "derivatives.design": ("Design", "design"),
+    "derivatives.fit": ("Fit", "fit"),
+    "derivatives.gradient": ("gradient",),
+    "derivatives.interface": ("sensitivity",),
     "errors": ("BackendError", "InputError"),
     "bodies.fields": ("Fields",),
     "interface.reduction": ("reduce", "reduce_bodies"),

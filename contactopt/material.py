@@ -23,3 +23,10 @@ def lame(material: Material) -> tuple[float, float]:
     """Lame's parameters (lambda, G) [stress]."""
     E, nu = material.E, material.nu
     return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
+
+
+def lame_by_poisson(material: Material) -> tuple[float, float]:
+    """Derivatives of Lame's parameters (lambda, G) by Poisson's ratio [stress]; by E they are (lambda, G) / E."""
+    E, nu = material.E, material.nu
+    below = (1 + nu) * (1 - 2 * nu)
+    return E / below + E * nu * (1 + 4 * nu) / below**2, -E / (2 * (1 + nu) ** 2)

@@ -55,8 +55,18 @@ class Program:
 def normal(problem: InterfaceProblem) -> Program:
     """min r_n' Q_nn r_n / 2 + (q_n + Q_nt r_t)' r_n   subject to  r_n >= 0,  V' r + s = 0.
 
-    Variable r_n (k,); parameter r_t (k (dim - 1),), zero unless set. Multipliers: "gap", "approach" of the plates whose
-    motion has a normal part.
+    This is contact without friction, or with given tangential forces.
+
+    Parameters
+    ----------
+    problem
+        Any interface problem; backends want it dimensionless.
+
+    Returns
+    -------
+    Program
+        Variable r_n (k,). Parameter r_t (k (dim - 1),), zero unless it is set. Multipliers "gap" (k,), and "approach"
+        of the plates whose motion has a normal part.
     """
     r, cost, balance, readers, r_t = _normal_parts(problem)
     push = r >= 0
@@ -65,11 +75,26 @@ def normal(problem: InterfaceProblem) -> Program:
 
 
 def displacements(problem: InterfaceProblem) -> Program:
-    """min (u - q_n - V_n lambda)' S (u - q_n - V_n lambda) / 2 - s' lambda   subject to  u >= 0,   S = Q_nn^-1.
+    """min (u - q_n - V_n lambda)' S (u - q_n - V_n lambda) / 2 - s' lambda   subject to  u >= 0,  S = Q_nn^-1.
 
-    The elastic energy minus the work of the loads. Variables u, the gap (k,), and lambda, the approach (p,); multiplier
-    "reaction", r_n = S (u - q_n - V_n lambda). The optimal value is minus that of `normal` at r_t = 0. InputError if
-    Q_nn is singular: then displacements do not determine forces.
+    The elastic energy minus the work of the loads, in displacements. The optimal value is minus that of `normal` at
+    r_t = 0.
+
+    Parameters
+    ----------
+    problem
+        Any interface problem; backends want it dimensionless.
+
+    Returns
+    -------
+    Program
+        Variables u, the gap (k,), and lambda, the approach (p,). Multiplier "reaction", r_n = S (u - q_n - V_n
+        lambda).
+
+    Raises
+    ------
+    InputError
+        If Q_nn is singular, because displacements do not determine forces then.
     """
     dim = problem.dim
     try:
@@ -89,9 +114,20 @@ def displacements(problem: InterfaceProblem) -> Program:
 def penalised(problem: InterfaceProblem, stiffness: float = 1e3) -> Program:
     """`normal` plus |r_n|^2 / (2 stiffness): bodies may penetrate, r_n = stiffness max(-u_n, 0).
 
-    This is the dual of penalising max(-u_n, 0)^2 in displacements; the penetration falls like 1 / stiffness. stiffness
-    [force / length] counts per node. Variable r_n (k,); parameters r_t (k (dim - 1),) and softness = 1 / stiffness;
-    multipliers "gap", negative where the bodies penetrate, and "approach".
+    This is the dual of penalising max(-u_n, 0)^2 in displacements. The penetration falls like 1 / stiffness.
+
+    Parameters
+    ----------
+    problem
+        Any interface problem; backends want it dimensionless.
+    stiffness
+        Of each contact node [force / length].
+
+    Returns
+    -------
+    Program
+        Variable r_n (k,). Parameters r_t (k (dim - 1),) and softness = 1 / stiffness. Multipliers "gap", negative
+        where the bodies penetrate, and "approach".
     """
     r, cost, balance, readers, r_t = _normal_parts(problem)
     softness = cp.Parameter(nonneg=True, value=1 / stiffness)
@@ -102,9 +138,19 @@ def penalised(problem: InterfaceProblem, stiffness: float = 1e3) -> Program:
 
 
 def bilateral(problem: InterfaceProblem) -> Program:
-    """min r_n' Q_nn r_n / 2 + (q_n + Q_nt r_t)' r_n   subject to  V' r + s = 0: no separation, u_n = 0.
+    """min r_n' Q_nn r_n / 2 + (q_n + Q_nt r_t)' r_n   subject to  V' r + s = 0.
 
-    Variable r_n (k,) of any sign; parameter r_t (k (dim - 1),); multiplier "approach".
+    The surfaces cannot separate, u_n = 0.
+
+    Parameters
+    ----------
+    problem
+        Any interface problem; backends want it dimensionless.
+
+    Returns
+    -------
+    Program
+        Variable r_n (k,) of any sign. Parameter r_t (k (dim - 1),). Multiplier "approach".
     """
     r, cost, balance, readers, r_t = _normal_parts(problem)
     return Program(cp.Problem(cp.Minimize(cost), balance), {"r_n": r}, {"r_t": r_t}, readers)
@@ -113,9 +159,22 @@ def bilateral(problem: InterfaceProblem) -> Program:
 def tangential(problem: InterfaceProblem, facets: int | None = None) -> Program:
     """min r_t' Q_tt r_t / 2 + (q_t + Q_tn r_n + V_t lambda)' r_t   subject to  |r_t| <= g at each contact.
 
-    Intervals in 2D, discs in 3D; with `facets` each disc is the regular polygon inscribed in it. Plates that only move
-    tangentially belong to this program, V_t' r_t + s = 0; the approach lambda of the others is given. Variable r_t
-    (k (dim - 1),); parameters r_n (k,), g (k,), approach; multipliers "slip" u_t, "shift" of the tangential plates.
+    Plates that only move tangentially belong to this program, V_t' r_t + s = 0. The approach lambda of the others is
+    given.
+
+    Parameters
+    ----------
+    problem
+        Any interface problem; backends want it dimensionless.
+    facets
+        Number of edges of the regular polygon that is inscribed in each disc; None for discs, which are intervals in
+        2D.
+
+    Returns
+    -------
+    Program
+        Variable r_t (k (dim - 1),). Parameters r_n (k,), g (k,) and approach. Multipliers "slip" u_t, and "shift" of
+        the tangential plates.
     """
     n, t = _components(problem)
     plates, V = _pushing(problem), problem.V[t]
@@ -134,8 +193,20 @@ def tangential(problem: InterfaceProblem, facets: int | None = None) -> Program:
 def tresca(problem: InterfaceProblem, facets: int | None = None) -> Program:
     """min r' Q r / 2 + q' r   subject to  r_n >= 0 where contacts may open,  |r_t| <= g,  V' r + s = 0.
 
-    Tresca's law where g is its limit, Coulomb's law where g = mu |r_n|. Variable r (k dim,), normal first in each block; parameter g (k,); multipliers
-    "gap", "slip", "approach".
+    This is Tresca's law where g is its limit, and Coulomb's law where g = mu |r_n|.
+
+    Parameters
+    ----------
+    problem
+        Any interface problem; backends want it dimensionless.
+    facets
+        Number of edges of the regular polygon that is inscribed in each disc; None for discs, which are intervals in
+        2D.
+
+    Returns
+    -------
+    Program
+        Variable r (k dim,), normal first in each block. Parameter g (k,). Multipliers "gap", "slip" and "approach".
     """
     r, r_n, r_t, cost, balance, approach = _parts(problem)
     g = cp.Parameter(problem.contacts, nonneg=True)
@@ -148,8 +219,26 @@ def tresca(problem: InterfaceProblem, facets: int | None = None) -> Program:
 def associated(problem: InterfaceProblem, facets: int | None = None) -> Program:
     """min r' Q r / 2 + q' r   subject to  r in Coulomb's cones |r_t| <= mu r_n,  V' r + s = 0.
 
-    Its optimality conditions are those of friction with an associated flow rule: contacts that slip also open, by
-    u_n = mu |u_t|. Variable r (k dim,); multipliers "gap" (so opened), "slip", "approach". InputError without such cones.
+    Its optimality conditions are those of friction with an associated flow rule: contacts that slip also open, by u_n
+    = mu |u_t|.
+
+    Parameters
+    ----------
+    problem
+        Any interface problem; backends want it dimensionless.
+    facets
+        Number of edges of the regular polygon that is inscribed in each disc; None for discs, which are intervals in
+        2D.
+
+    Returns
+    -------
+    Program
+        Variable r (k dim,). Multipliers "gap" (so opened), "slip" and "approach".
+
+    Raises
+    ------
+    InputError
+        If the law has no such cones.
     """
     return _over_cones(problem, None, facets)
 
@@ -157,21 +246,50 @@ def associated(problem: InterfaceProblem, facets: int | None = None) -> Program:
 def acary_cadoux(problem: InterfaceProblem, facets: int | None = None) -> Program:
     """min r' Q r / 2 + (q + mu s n)' r   subject to  r in Coulomb's cones,  V' r + s_plates = 0.
 
-    u_n + mu s is at least mu |u_t|, so that Coulomb's law holds where s = |u_t|. Variable r (k dim,); parameter s (k,),
-    zero unless set; multipliers "gap" u_n, "slip" u_t, "approach". InputError without such cones.
-    Source: Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb friction problem via
-    convex optimization.
+    At its solution u_n + mu s is at least mu |u_t|, so that Coulomb's law holds where s = |u_t|. Source: Acary,
+    Cadoux, Lemarechal, Malick (2011), A formulation of the linear discrete Coulomb friction problem via convex
+    optimization.
+
+    Parameters
+    ----------
+    problem
+        Any interface problem; backends want it dimensionless.
+    facets
+        Number of edges of the regular polygon that is inscribed in each disc; None for discs, which are intervals in
+        2D.
+
+    Returns
+    -------
+    Program
+        Variable r (k dim,). Parameter s (k,), zero unless it is set. Multipliers "gap" u_n, "slip" u_t and
+        "approach".
+
+    Raises
+    ------
+    InputError
+        If the law has no such cones.
     """
     s = cp.Parameter(problem.contacts, nonneg=True, value=np.zeros(problem.contacts))
     return _over_cones(problem, s, facets)
 
 
 def tangential_disc_program(Q: np.ndarray, A: np.ndarray) -> tuple[Any, Any, dict[str, Any]]:
-    """min t'Qt/2 + c't  subject to  |t_i| <= g_i for each contact i,  A t = b: `tangential` for one matrix and many c, b.
+    """min t' Q t / 2 + c' t   subject to  |t_i| <= g_i at each contact i,  A t = b.
 
-    Q (2k, 2k) symmetric positive semidefinite (checked by the caller: cvxpy's own check is unreliable), A (p, 2k);
-    parameters c (2k,), radii g (k,), b (p,). Returns the problem, the variable t (2k,), the parameters by name; the
-    multipliers of A t = b are the dual value of the last constraint. Build once, set parameters, solve many times.
+    This is `tangential` for one matrix and many c, g and b: build it once, set the parameters and solve many times.
+
+    Parameters
+    ----------
+    Q
+        (2k, 2k) symmetric positive semidefinite; the caller checks that, because cvxpy's own check is unreliable.
+    A
+        (p, 2k) rows of the balance.
+
+    Returns
+    -------
+    (problem, variable, parameters)
+        The cvxpy problem, its variable t (2k,), and its parameters c (2k,), g (k,) and b (p,) by name. The
+        multipliers of A t = b are the dual value of the last constraint.
     """
     k, p = len(Q) // 2, len(A)
     t = cp.Variable(2 * k, name="t")
@@ -185,10 +303,19 @@ def tangential_disc_program(Q: np.ndarray, A: np.ndarray) -> tuple[Any, Any, dic
 
 
 def as_conic(program: Program) -> dict[str, Any]:
-    """min x' P x / 2 + q' x  subject to  A x + y = b, y in (zero, nonnegative and second-order cones, in this order).
+    """The data of min x' P x / 2 + q' x  subject to  A x + y = b,  y in cones: zero, nonnegative, second-order, in
+    this order.
 
-    Keys P, q, A, b (P, A sparse, P in full), zero, nonneg (numbers of rows), soc (list of dimensions) and columns:
-    variable name -> its slice of x. Parameters must have values.
+    Parameters
+    ----------
+    program
+        Its parameters must have values.
+
+    Returns
+    -------
+    dict
+        Keys P, q, A, b (P and A sparse, P with both triangles), zero and nonneg (numbers of rows), soc (list of
+        dimensions), and columns: name of a variable -> its slice of x.
     """
     data, _, _ = program.problem.get_problem_data(cp.CLARABEL)
     dims, first = data["dims"], data["param_prob"].var_id_to_col
@@ -198,7 +325,23 @@ def as_conic(program: Program) -> dict[str, Any]:
 
 
 def as_qp(program: Program) -> Any:
-    """The qpsolvers.Problem of a program without cones, dense; x is ordered as in as_conic. InputError otherwise."""
+    """A program without cones for qpsolvers, with dense matrices.
+
+    Parameters
+    ----------
+    program
+        Its parameters must have values.
+
+    Returns
+    -------
+    qpsolvers.Problem
+        Its x is ordered as in as_conic().
+
+    Raises
+    ------
+    InputError
+        If the program has second-order cones.
+    """
     import qpsolvers
 
     conic = as_conic(program)

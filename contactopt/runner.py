@@ -4,37 +4,37 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from contactopt.analysis.accuracy import Estimate, refine
-from contactopt.analysis.paths import PathResult, follow
+from contactopt.analysis.paths import PathResult, solve_states
 from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
 from contactopt.analysis.resultants import tables
 from contactopt.analysis.solve_scene import Options, Solved
-from contactopt.analysis.surfaces import contact_fields, on_nodes
-from contactopt.analysis.zone import solve_zone
 from contactopt.bodies.ranks import Team, spread
+from contactopt.cards import card, count, line
 from contactopt.errors import InputError
+from contactopt.figures.output import PAGE, draw, earlier_files, squeeze, write
+from contactopt.figures.style import FORMATS
 from contactopt.files import check_folder, whole_folder
 from contactopt.interface.recovery import Fields, recover
 from contactopt.interface.reduction import Reduction
-from contactopt.problem import InterfaceProblem, Solution, alone, part_of
+from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.scenes import PATHS, make_path, make_scene
-from contactopt.scenes.scene import HalfSpace, Part, Scene
+from contactopt.scenes.scene import Part, Scene
 from contactopt.solving.methods import default_method, find_method
 
 if TYPE_CHECKING:
+    from contactopt.adaptivity.loop import AdaptedEstimate
     from contactopt.scenes.scene_files import SceneFile
 
-# What a run writes beside summary.json and one VTU file per body.
-RUN_FILES = ("deformed.png", "maps.png", "pressure.png", "path.png", "interface.npz", "history.csv", "path.npz")
 Note = Callable[[str], None]
 PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work")
 
@@ -57,7 +57,60 @@ class Result:
     zones: tuple[float, ...]
     summary: dict[str, Any]
     path: PathResult | None = None
-    estimate: Estimate | None = None
+    estimate: Estimate | AdaptedEstimate | None = None
+
+    def __repr__(self) -> str:
+        s = self.summary
+        states = "" if self.path is None else count(len(self.path.states), "state")
+        contacts = count(s["contact_nodes"], "contact")
+        return line("Result", self.scene.name, s["status"], f"residual {s['residual']:.1e}", contacts, states)
+
+    def _repr_html_(self) -> str:
+        s, (length, stress) = self.summary, self.scene.units
+        rows: dict[str, object] = {
+            "status": f"{s['status']}: {self.solution.message}",
+            "residual (certificate)": f"{s['residual']:.2e}",
+            "unknowns, contacts": f"{s['dofs']}, {s['contact_nodes']}",
+            "normal force": f"{s['normal_force']:.6g} {stress} {length}^2",
+            "largest pressure": f"{s['max_pressure']:.6g} {stress}",
+        }
+        for key in ("approach", "contact_half_width", "stick_half_width"):
+            if s[key] is not None:
+                rows[key.replace("_", " ")] = f"{s[key]:.6g} {length}"
+        return card(f"{self.scene.name}, {self.scene.friction}", rows)
+
+    def view(self, file: str | Path | None = None, show: bool = True) -> Path:
+        """Write the result as one page to explore in a browser, and open it.
+
+        The page needs no network and nothing but the browser (contactopt.figures.page says what is on it).
+
+        Parameters
+        ----------
+        file : where to write the page, ends in .html; None: a temporary file
+        show : whether to open it in the browser
+
+        Returns
+        -------
+        Path : of the page
+
+        Raises
+        ------
+        InputError : if plotly is not installed, which the page takes its drawing program from, or if the file cannot be written
+        """
+        import tempfile
+        import webbrowser
+
+        from contactopt.figures.page import write_page
+
+        if file is None:
+            file = Path(tempfile.mkdtemp(prefix="contactopt-")) / PAGE
+        with tempfile.TemporaryDirectory() as folder:
+            write(self, Path(folder))
+            (Path(folder) / "summary.json").write_text(json.dumps(self.summary))
+            made = write_page(folder, file)
+        if show:
+            webbrowser.open(made.resolve().as_uri())
+        return made
 
     @property
     def problem(self) -> InterfaceProblem:
@@ -71,7 +124,7 @@ class Result:
     @property
     def traction(self) -> np.ndarray:
         """Tangential traction on the upper body, (k,) or in 3D (k, 2) [stress]."""
-        return _squeeze(self.solution.reactions[:, 1:] / self.problem.areas[:, None])
+        return squeeze(self.solution.reactions[:, 1:] / self.problem.areas[:, None])
 
 
 def run(
@@ -88,6 +141,9 @@ def run(
     elements: int | None = None,
     accuracy: float | None = None,
     quantity: str | None = None,
+    adaptive: bool = False,
+    figures: Sequence[str] = ("png",),
+    html: bool = False,
     note: Note = lambda text: None,
     team: Team | None = None,
     **changes: Any,
@@ -108,7 +164,12 @@ def run(
     accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
         sentence in `Result.estimate` says why not; `elements` only scales the first mesh
     quantity : a name in contactopt.analysis.quantities.QUANTITIES
+    adaptive : whether meshes are refined only where the quantity needs it (contactopt.adaptivity), each body by itself, and not
+        everywhere; quadrilaterals become triangles. More quantities can be bounded then, see contactopt.derivatives.outputs
         All arguments from `method` to here may stand in a scene file; those given here win.
+    figures : the formats in which figures are written, of png, svg and pdf; (): none are drawn, which saves half of the time
+        of a small scene
+    html : whether to write view.html too, the result as a page to explore (needs `pip install 'contactopt[view]'`)
     note : receives progress messages
     team : ranks among which the bodies are dealt out (contactopt.bodies.ranks); None: all bodies live in this process
     changes : to the arguments of a named scene, or to the fields of a Scene
@@ -122,6 +183,7 @@ def run(
     InputError : on input that cannot be used, with a sentence that says what to do; nothing is left half-written
     """
     start = time.perf_counter()
+    files = _wanted_files(figures, html)
     file = _scene_file(scene)
     told = {} if file is None else file.solve
 
@@ -133,7 +195,7 @@ def run(
     names = {"normal": normal, "tangential": tangential, "preconditioner": preconditioner}
     given = {key: choose(key, name) for key, name in names.items() if choose(key, name) is not None}
     method = choose("method", method) or default_method(given)
-    accuracy, quantity = choose("accuracy", accuracy), choose("quantity", quantity)
+    aim = _aim(choose("accuracy", accuracy), choose("quantity", quantity), choose("adaptive", adaptive or None, False))
     chosen = find_method(method, **given)
     backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
     form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
@@ -144,25 +206,36 @@ def run(
             note(f"{idle} of {team.size} ranks have nothing to do: there are no more elastic bodies")
         states = tuple(spread(state, team) for state in states)
     try:
-        return _finish(states, out, method, backends, options, accuracy, quantity, start)
+        return _finish(states, out, files, method, backends, options, aim, start)
     except InputError as error:
         raise error if file is None else file.located(error) from error
+
+
+def _wanted_files(figures: Sequence[str], html: bool) -> tuple[str, ...]:
+    """The formats of the figures, and 'html' for the page; InputError, before any work, for what cannot be written."""
+    if isinstance(figures, str) or not set(figures) <= set(FORMATS):
+        raise InputError(f"figures must be formats of {', '.join(FORMATS)}, or () for none; got {figures!r}.")
+    if html:
+        from contactopt.figures.page import check_installed
+
+        check_installed()
+    return (*figures, *(["html"] if html else []))
 
 
 def _finish(
     states: tuple[Scene, ...],
     out: str | Path | None,
+    files: tuple[str, ...],
     method: str,
     backends: tuple[str, str],
     options: Options,
-    accuracy: float | None,
-    quantity: str | None,
+    aim: Aim | None,
     start: float,
 ) -> Result:
     """Solve the states, and write figures and files; `start` is when the clock began."""
     if out is not None:
         check_folder(Path(out))
-    solved, path, estimate = _solve(states, accuracy, quantity, options)
+    solved, path, estimate = _solve(states, aim, options)
     seconds = dict(solved.solution.seconds)
     with _clock(seconds, "recover"):
         fields = recover(solved.reduction, solved.solution)
@@ -172,14 +245,20 @@ def _finish(
     )
     if out is None:
         return replace(made, summary=summary | _seconds(seconds, start))
-    options.note("drawing figures, writing files")
-    with whole_folder(out, _earlier_files(Path(out))) as folder:
-        with _clock(seconds, "figures"):
-            _draw(made, folder)
+    formats = [name for name in files if name != "html"]
+    options.note("drawing figures, writing files" if formats else "writing files")
+    with whole_folder(out, earlier_files(Path(out))) as folder:
+        if formats:
+            with _clock(seconds, "figures"):
+                draw(made, folder, formats)
         with _clock(seconds, "files"):
-            _write(made, folder)
+            write(made, folder)
         made = replace(made, summary=summary | _seconds(seconds, start))
         (folder / "summary.json").write_text(json.dumps(made.summary, indent=2) + "\n")
+        if "html" in files:
+            from contactopt.figures.page import write_page
+
+            write_page(folder, folder / PAGE)
     return made
 
 
@@ -202,10 +281,11 @@ def _states(scene: Any, changes: dict[str, Any]) -> tuple[Scene, ...]:
     """The scene, or the states of its load path."""
     if isinstance(scene, str):
         return make_path(scene, **changes) if scene in PATHS else (make_scene(scene, **changes),)
-    try:
-        return (replace(scene, **changes),)
-    except TypeError as error:
-        raise InputError(f"scene '{scene.name}': {error}.") from error
+    known = [field.name for field in fields(scene)]
+    for name in changes:
+        if name not in known:
+            raise InputError(f"a Scene has no field {name!r}; its fields are {', '.join(known)}.")
+    return (replace(scene, **changes),)
 
 
 def _form(Q: str, preconditioner: str | None) -> str:
@@ -216,23 +296,48 @@ def _form(Q: str, preconditioner: str | None) -> str:
     return "implicit"
 
 
-def _solve(
-    states: tuple[Scene, ...], accuracy: float | None, quantity: str | None, options: Options
-) -> tuple[Solved, PathResult | None, Estimate | None]:
-    """One of three loops: refinement to an accuracy, a load path, or the contact zone of one scene."""
+class Aim(NamedTuple):
+    """An accuracy to be reached: the bound, what it bounds, and whether meshes are refined only where that needs it."""
+
+    accuracy: float
+    quantity: str
+    adaptive: bool
+
+
+def _aim(accuracy: float | None, quantity: str | None, adaptive: bool) -> Aim | None:
     if (accuracy is None) != (quantity is None):
         raise InputError("accuracy and quantity belong together: the bound, and the name of what it bounds.")
-    if accuracy is not None and quantity is not None:
-        mesh, estimate = refine(states, quantity, accuracy, options)
-        return mesh.solved, mesh.path, estimate
+    if accuracy is None or quantity is None:
+        if adaptive:
+            raise InputError("adaptive refinement needs an aim: give an accuracy and a quantity.")
+        return None
+    return Aim(accuracy, quantity, adaptive)
+
+
+def _solve(
+    states: tuple[Scene, ...], aim: Aim | None, options: Options
+) -> tuple[Solved, PathResult | None, Estimate | AdaptedEstimate | None]:
+    """The scene or its load path, on its own mesh or on meshes refined to an accuracy."""
+    if aim is None:
+        solved = solve_states(states, options=options)
+        return solved, solved.path, None
+    if not aim.adaptive:
+        mesh, estimate = refine(states, aim.quantity, aim.accuracy, options)
+        return mesh.solved, mesh.solved.path, estimate
     if len(states) > 1:
-        path = follow(states, note=options.note, Q=options.Q, solver=options.solver, **options.of_solve)
-        return Solved(path.reduction, path.solution), path, None
-    return solve_zone(states[0], options=options), None, None
+        raise InputError(f"scene '{states[0].name}' has a load path, which adaptive refinement does not follow.")
+    from contactopt.adaptivity import refine_locally  # it brings the room of derivatives with it
+
+    solved, adapted = refine_locally(states[0], aim.quantity, aim.accuracy, options)
+    return solved, None, adapted
 
 
 def _summary(
-    solved: Solved, method: str, backends: tuple[str, str], path: PathResult | None, estimate: Estimate | None
+    solved: Solved,
+    method: str,
+    backends: tuple[str, str],
+    path: PathResult | None,
+    estimate: Estimate | AdaptedEstimate | None,
 ) -> dict[str, Any]:
     """What is known of the answer but for the seconds: half-widths and pressure are the quantities that accuracy bounds."""
     reduction, solution = solved.reduction, solved.solution
@@ -241,6 +346,8 @@ def _summary(
     single = len(problem.pairs) == 1
     summary: dict[str, Any] = {
         "scene": reduction.scene.name,
+        "kind": reduction.scene.kind,
+        "units": list(reduction.scene.units),
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
         "mu": float(problem.mu.max(initial=0.0)),
@@ -248,6 +355,7 @@ def _summary(
         "normal_backend": backends[0],
         "tangential_backend": backends[1],
         "status": solution.status.label,
+        "message": solution.message,
         "residual": float(solution.residual),
         "outer_iterations": solution.iterations,
         "normal_force": float(r[:, 0].sum()),
@@ -268,10 +376,6 @@ def _summary(
     return summary
 
 
-def _squeeze(t: np.ndarray) -> np.ndarray:
-    return t[:, 0] if t.shape[1] == 1 else t
-
-
 @contextmanager
 def _clock(seconds: dict[str, float], phase: str) -> Iterator[None]:
     begin = time.perf_counter()
@@ -281,67 +385,3 @@ def _clock(seconds: dict[str, float], phase: str) -> Iterator[None]:
 
 def _seconds(seconds: dict[str, float], start: float) -> dict[str, Any]:
     return {"seconds": seconds | {"total": time.perf_counter() - start}}
-
-
-def _draw(result: Result, folder: Path) -> None:
-    from contactopt import plots
-
-    problem, solution = result.problem, result.solution
-    if result.fields:
-        picture = plots.deformed(result.scene, part_of(problem, problem.pairs[0]), result.fields)
-        picture.figure.savefig(folder / "deformed.png", dpi=130)
-    if any(isinstance(part, HalfSpace) for part in result.scene.parts):
-        from contactopt.figures.maps import maps_figure
-
-        maps_figure(result.reduction, result.solution).savefig(folder / "maps.png", dpi=130)
-    for pair in problem.pairs:
-        name = "pressure" if len(problem.pairs) == 1 else f"pressure-{pair.name}"
-        plots.contact_figure(result.scene, *alone(problem, solution, pair)).savefig(folder / f"{name}.png", dpi=130)
-    if result.path is not None:
-        from contactopt.figures.animation import path_figure
-
-        path_figure(result.path).savefig(folder / "path.png", dpi=130)
-
-
-def _write(result: Result, folder: Path) -> None:
-    surfaces = contact_fields(result.reduction, result.solution)
-    for fields in on_nodes(result.reduction, result.fields, surfaces):
-        fields.write_vtu(folder / f"{fields.name}.vtu")
-    for surface in surfaces:
-        surface.write_vtu(folder / f"contact-{surface.name}.vtu")
-    problem, r = result.problem, result.solution.reactions
-    places = np.concatenate([pair.chart.places for pair in problem.pairs], axis=1)
-    x = places.T if problem.dim == 3 else places[0]
-    np.savez(
-        folder / "interface.npz",
-        x=x,  # along the contact surface
-        coordinates=problem.coordinates,
-        r_n=r[:, 0],
-        r_t=_squeeze(r[:, 1:]),
-        pressure=result.pressure,
-        traction=result.traction,
-    )
-    if result.path is not None:
-        result.path.write(folder)
-
-
-def _earlier_files(folder: Path) -> set[str]:
-    """Names of the files that an earlier `contactopt run` wrote into the folder; empty where none has run.
-
-    A folder in which one has run holds its summary.json. Its other files have fixed names, but for a VTU file per body and
-    per pair of surfaces, told from other people's by the fields in them, and pictures of the pairs that the summary names.
-    """
-    with suppress(OSError, ValueError, TypeError):
-        summary = json.loads(_plain_text(folder / "summary.json"))
-        if "contact_nodes" in summary:
-            marks = ('"von_mises"', '"contact_pressure"')
-            found = {file.name for file in folder.glob("*.vtu") if any(mark in _plain_text(file) for mark in marks)}
-            pictures = {f"pressure-{pair}.png" for pair in summary.get("pairs", {})}
-            found |= {file.name for file in folder.glob("pressure-*.png") if file.name in pictures}
-            return found | {name for name in RUN_FILES if (folder / name).exists()}
-    return set()
-
-
-def _plain_text(file: Path) -> str:
-    """What a regular file holds; nothing for links and devices."""
-    return "" if file.is_symlink() or not file.is_file() else file.read_text(errors="replace")

@@ -7,6 +7,7 @@ from conftest import two_blocks
 from skfem import MeshQuad
 
 from contactopt import InputError, cli, run, scenes, solve
+from contactopt.analysis import accuracy
 from contactopt.analysis.accuracy import MOST_UNKNOWNS, refine, remainder
 from contactopt.analysis.quantities import QUANTITIES, at_rim, peak_pressure
 from contactopt.analysis.zone import solve_zone
@@ -140,6 +141,22 @@ def test_a_limit_on_unknowns(monkeypatch):
     solved, estimate = refine([punch()], "energy", 1e-6)
     assert not estimate.reached and "unknowns, more than 3,000" in estimate.message
     assert solved.reduction.dofs <= 3000 and estimate.error > 1e-6
+
+
+def test_a_limit_on_memory(monkeypatch):
+    """The next mesh is not begun where the meshes so far show that it would take more."""
+    taken = iter(np.arange(100) * 1e6)  # each solve takes a megabyte
+    monkeypatch.setattr(accuracy, "resident_memory", lambda: next(taken))
+    monkeypatch.setattr(accuracy, "MOST_MEMORY", 5e6)
+    solved, estimate = refine([punch()], "energy", 1e-6)
+    assert not estimate.reached and "GB of memory, more than 0.005 GB" in estimate.message
+    count = len(estimate.levels)
+    assert 2 <= count < 5 and solved.solution.solved
+    most = max(level.unknowns for level in estimate.levels)
+    monkeypatch.setattr(accuracy, "resident_memory", lambda: 0.0)  # a system that does not tell
+    monkeypatch.setitem(MOST_UNKNOWNS, 2, most + 1)
+    _, estimate = refine([punch()], "energy", 1e-6)
+    assert "unknowns, more than" in estimate.message and len(estimate.levels) >= count
 
 
 def test_given_meshes_are_halved():

@@ -120,7 +120,12 @@ def test_stability_map_and_its_thresholds():
     np.testing.assert_array_equal(figure.axes[0].get_images()[0].get_array(), [[1, 1, 0], [1, 1, 0]])
     (line,) = figure.axes[0].get_lines()
     np.testing.assert_allclose(line.get_xydata(), [[1, 0], [0, 1]])  # mu = 1 in the first row, .1 in the second
-    shown = figures.stability_map(rows, value="iterations").axes[0].get_images()[0].get_array()
+    shown = (
+        figures.stability_map(rows, x="problem.nu", y="problem.elements", value="iterations")
+        .axes[0]
+        .get_images()[0]
+        .get_array()
+    )
     assert np.ma.getmaskarray(np.ma.masked_invalid(shown))[:, 2].all() and shown[0, 0] == 7
 
 
@@ -249,3 +254,59 @@ def test_committed_reports_follow_from_their_tables(path, tmp_path, monkeypatch)
 
     assert kept(tmp_path / name / "report.md") == kept(folder / "report.md")
     assert all(file.stat().st_size < 1_000_000 for file in folder.iterdir())
+
+
+def test_sixteen_methods_have_their_own_markers_and_labels_where_their_lines_end():
+    names = [f"m{i:02}" for i in range(16)]
+    rows = table(method=names, solve_seconds=[0.01 * 1.3**i for i in range(16)], residual=[1e-7] * 16)
+    ax = figures.speed_accuracy(rows).axes[0]
+    drawn = [line for line in ax.get_lines() if line.get_label() in names]
+    assert len({line.get_marker() for line in drawn}) == 16
+    assert sorted(text.get_text() for text in ax.texts) == names
+    boxes = [text.get_position() for text in ax.texts]
+    assert len(set(boxes)) > 1 or len(ax.texts) == 16
+
+
+def test_long_labels_are_shortened_and_can_be_set():
+    long = "normal_qp(backend='clarabel', exact=True)"
+    rows = table(method=[long, "normal_qp(backend='clarabel', exact=False)"], solve_seconds=[1.0, 2.0], contacts=[1, 1])
+    curves = lines(figures.performance_profile(rows))
+    assert {"normal_qp clarabel exact (1)", "normal_qp clarabel (1)"} <= set(curves)
+    for draw in (figures.performance_profile, figures.speed_accuracy, figures.time_against_size):
+        assert any(label.startswith("mine") for label in lines(draw(rows, labels={long: "mine"})))
+
+
+def test_nothing_is_drawn_below_a_hundredth_of_the_tolerance():
+    rows = table(method=["a"], solve_seconds=[1.0], residual=[1e-16])
+    np.testing.assert_allclose(lines(figures.speed_accuracy(rows))["a"], [[1.0, 1e-8]])
+
+
+def test_the_cells_of_a_map_hold_their_numbers():
+    rows = table(**{"problem.nu": [0.1, 1.0], "problem.elements": [1.0, 1.0], "iterations": [1.0, 40.0]})
+    ax = figures.stability_map(rows, x="problem.nu", y="problem.elements", value="iterations").axes[0]
+    assert [text.get_text() for text in ax.texts] == ["1", "40"]
+    rows["success"] = [True, False]
+    ax = figures.stability_map(rows, x="problem.nu", y="problem.elements", value="iterations").axes[0]
+    assert [text.get_text() for text in ax.texts] == ["1"] and ax.patch.get_hatch()
+
+
+def test_the_axis_of_a_profile_is_called_a_ratio():
+    rows = table(solve_seconds=[1.0])
+    assert (
+        figures.performance_profile(rows)
+        .axes[0]
+        .get_xlabel()
+        .startswith("ratio: time of the method / that of the best")
+    )
+
+
+def test_an_experiment_without_figures_gets_the_usual_ones_and_an_optional_one_may_be_missing(tmp_path):
+    main(["bench", str(written(tmp_path, SMALL)), "--out", str(tmp_path / "out"), "--jobs", "1", "-q"])
+    text = (tmp_path / "out" / "report.md").read_text()
+    assert text.count("*Table ") == 2 and text.count("*Figure ") == 2
+    extra = '\n[[figures]]\nkind = "success_table"\ncaption = "none"\nwhere = {setting = "nowhere"}\noptional = true\n'
+    experiment = tmp_path / "out" / "experiment.toml"
+    experiment.write_text(experiment.read_text() + extra + extra.replace("nowhere", "mid").replace('"none"', '"some"'))
+    assert main(["report", str(tmp_path / "out")]) == 0
+    text = (tmp_path / "out" / "report.md").read_text()
+    assert "some" in text and "none" not in text.partition("some")[0]

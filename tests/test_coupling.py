@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 import turned
 from conftest import MATERIAL, block, two_blocks
 
-from contactopt import InputError, Part, Rigid, Scene, Support, reduce, reduce_bodies, scenes, solve
+from contactopt import InputError, InterfaceProblem, Part, Rigid, Scene, Support, reduce, reduce_bodies, scenes, solve
 from contactopt.analysis.paths import follow
 from contactopt.analysis.quantities import elastic_energy
 from contactopt.bodies import BODIES
@@ -265,6 +266,9 @@ def test_a_large_array_is_announced_and_a_huge_one_refused(monkeypatch, caplog):
     with pytest.raises(InputError, match="would take 800 bytes, more than 799; take Q = 'implicit'"):
         reduce(scene, Q="explicit")
     assert reduce(scene, Q="implicit").contacts == 5
+    rows = sp.csr_array(np.eye(10))
+    with pytest.raises(InputError, match="would take 800 bytes, more than 799"):  # the same limit for sparse rows
+        InterfaceProblem(rows, np.zeros((5, 2)), 0.3).explicit()
 
 
 def test_meshes_keep_their_own_mapping():

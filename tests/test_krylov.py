@@ -12,7 +12,14 @@ from contactopt.bodies.solvers.superlu import SuperLUSolver
 from contactopt.interface.costs import form_of
 from contactopt.problem import dimensionless
 from contactopt.problem.chart import Chart
-from contactopt.problem.operators import InterfaceOperator, block, estimate_diagonal, nodal_weights
+from contactopt.problem.operators import (
+    InterfaceOperator,
+    block,
+    estimate_diagonal,
+    loosened,
+    nodal_weights,
+    shifted,
+)
 from contactopt.scenes import make_scene
 from contactopt.solving.kernels.alart_curnier import coulomb_equations
 from contactopt.solving.kernels.krylov import krylov_step, model_of
@@ -224,3 +231,15 @@ def test_loaded_reduction_equals_a_new_one(dim):
 def test_preconditioner_and_explicit_Q_exclude_each_other():
     with pytest.raises(InputError, match="drop one of them"):
         run("punch-2d", Q="explicit", preconditioner="p21")
+
+
+def test_operators_that_share_their_work_count_together():
+    """A block, looser products and a shifted diagonal count with the operator that they are made from; a scaled one does not."""
+    Q = InterfaceOperator(lambda X, accuracy: 2 * X, np.full(4, 2.0), inexact=True)
+    x = np.ones(4)
+    assert np.all(Q @ x == 2) and Q.products == 1
+    assert np.all(block(Q, np.array([0, 2])) @ x[:2] == 2) and Q.products == 2
+    assert np.all(loosened(Q, 1e-3) @ x == 2) and Q.products == 3
+    assert np.all(shifted(Q, np.arange(4.0)) @ x == 2 + np.arange(4)) and Q.products == 4
+    other = Q.scaled(3.0, np.zeros(4))
+    assert np.all(other @ x == 6) and (other.products, Q.products) == (1, 4)

@@ -69,7 +69,7 @@ def disc_in_plate(gmsh, path, dim, order, recombine=False, incomplete=False, ver
     return path
 
 
-@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize("version", [2.2, 4.0, 4.1])
 @pytest.mark.parametrize(
     "dim,order,recombine,incomplete,kind",
     [
@@ -96,6 +96,31 @@ def test_gmsh_parts_share_a_rim_with_opposite_normals(gmsh, tmp_path, version, d
         load_mesh(path, "ring")
     with pytest.raises(InputError, match="'rim' is a group of facets, a boundary"):
         load_mesh(path, "rim")
+
+
+@pytest.mark.parametrize("version", [4.0, 4.1])
+def test_gmsh_files_whose_points_and_edges_belong_to_no_group(gmsh, tmp_path, version):
+    gmsh.option.setNumber("Mesh.MshFileVersion", version)
+    gmsh.option.setNumber("Mesh.SaveAll", 1.0)
+    square = gmsh.model.occ.addRectangle(0, 0, 0, 2, 1)
+    gmsh.model.occ.synchronize()
+    gmsh.model.addPhysicalGroup(2, [square])
+    gmsh.model.addPhysicalGroup(1, [1], name="low side")
+    gmsh.model.addPhysicalGroup(1, [1, 3], name="both")
+    gmsh.model.mesh.generate(2)
+    gmsh.write(str(tmp_path / "a.msh"))
+    mesh = load_mesh(tmp_path / "a.msh", "1")
+    assert volume(mesh) == pytest.approx(2.0) and set(mesh.boundaries) == {"low side", "both"}
+    assert np.all(mesh.p[1, mesh.facets[:, mesh.boundaries["low side"]]] == 0)
+    assert set(mesh.boundaries["low side"]) < set(mesh.boundaries["both"])
+
+
+def test_other_versions_of_gmsh_files_are_named(tmp_path):
+    (tmp_path / "a.msh").write_text("$MeshFormat\n3 0 8\n$EndMeshFormat\n")
+    (tmp_path / "b.msh").write_text("$NOD\n0\n$ENDNOD\n")
+    for name, number in (("a", 3), ("b", 1)):
+        with pytest.raises(InputError, match=f"version {number} of Gmsh's format; save it in version 4.1 or 2.2"):
+            load_mesh(tmp_path / f"{name}.msh")
 
 
 def curved_bricks():

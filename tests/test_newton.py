@@ -139,6 +139,27 @@ def test_steps_hardly_depend_on_the_mesh(elements):
     assert warm.solved and warm.iterations - 1 <= 4
 
 
+@pytest.mark.parametrize("reach", [2.0, 200.0])
+@pytest.mark.parametrize("mu", [0.0, 0.4])
+def test_steps_hardly_depend_on_how_far_the_surfaces_reach(reach, mu):
+    """A cylinder on a half-plane, candidates up to 200 half-widths away: peeling them off one by one takes 30 steps."""
+    right = np.concatenate([np.linspace(0, 2, 41), 2.0 * np.geomspace(1.0, 100.0, 25)[1:]])
+    x = np.concatenate([-right[:0:-1], right])
+    x = x[np.abs(x) <= reach]
+    areas = np.gradient(x)
+    normal = -np.log(np.maximum(np.abs(x[:, None] - x), areas / 5.44) / 1e3) / np.pi  # Flamant: mean over a strip
+    Q = np.zeros((len(x), 2, len(x), 2))
+    Q[:, 0, :, 0] = Q[:, 1, :, 1] = (normal + normal.T) / 2
+    V = np.zeros((len(x), 2, 1))
+    V[:, 0] = -1.0
+    q = np.stack([x**2 / 4, 0 * x], axis=1)
+    problem = InterfaceProblem(Q.reshape(2 * len(x), -1), q, mu, V.reshape(-1, 1), [np.pi / 4], areas)
+    solution = solve(problem, method="newton")
+    assert solution.solved and solution.iterations <= 8
+    pressure = solution.reactions[:, 0] / areas
+    assert np.abs(pressure - np.sqrt(np.maximum(1 - x**2, 0.0)) / 2).max() < 0.03  # Hertz: half-width 1
+
+
 def test_transfer_keeps_the_traction():
     coarse, fine = (reduce(scenes.flat_punch(3, elements=n)) for n in (3, 5))
     moved = transfer(coarse, solve(coarse), fine)

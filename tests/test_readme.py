@@ -13,7 +13,8 @@ EXAMPLES = re.findall(r"```python\n(.*?)```", README, re.S)
 
 
 @pytest.mark.parametrize("code", EXAMPLES)
-def test_python_examples_run(code, capsys):
+def test_python_examples_run(code, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # what an example writes stays there
     exec(compile(code, "README.md", "exec"), {})
     assert "False" not in capsys.readouterr().out
 

@@ -11,6 +11,8 @@ from contactopt.analysis.quantities import QUANTITIES
 
 KEYS = [
     "scene",
+    "kind",
+    "units",
     "dofs",
     "contact_nodes",
     "mu",
@@ -18,6 +20,7 @@ KEYS = [
     "normal_backend",
     "tangential_backend",
     "status",
+    "message",
     "residual",
     "outer_iterations",
     "normal_force",

@@ -1,5 +1,7 @@
 """A time limit is kept by every method, inside its backend too, on problems that no method finds easy."""
 
+import os
+import signal
 import time
 from contextlib import suppress
 
@@ -7,7 +9,10 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, InterfaceProblem, solve
-from contactopt.solving.backends import CONIC, QP
+from contactopt.errors import BackendError
+from contactopt.solving.backends import CONIC, QP, child
+from contactopt.solving.backends.qp import BoxQP
+from contactopt.solving.deadline import TimeUp, until
 from contactopt.solving.methods import METHODS
 from experiments.questions.granular import packing
 
@@ -75,3 +80,32 @@ def test_no_quadratic_program_outlasts_it(case, backend):
 def test_no_cone_program_outlasts_it(case, backend):
     make, dim = CASES[case]
     assert seconds_of(make(dim), "tresca", backend=backend) < LIMIT + SLACK
+
+
+@pytest.mark.parametrize("backend", [b for b in QP if QP[b].installed and not QP[b].clock and not QP[b].steps])
+def test_programs_that_no_backend_can_interrupt_end_in_time(backend, monkeypatch):
+    """A program of 401 unknowns in a process of its own: the same answer with time enough, and no hang without."""
+    rng = np.random.default_rng(3)
+    A = rng.normal(size=(401, 401))
+    P, c, none = A @ A.T / 401 + 1e-2 * np.eye(401), rng.normal(size=401), np.zeros(0)
+    program = BoxQP.using(backend, P, np.zeros((0, 401)))
+    arguments = c, none, np.zeros(401), np.full(401, np.inf)
+    with until(time.perf_counter() + 60):
+        x, _ = program.solve(*arguments)
+    gradient = P @ x + c
+    assert np.abs(np.minimum(x, gradient)).max() < 1e-5 and x.max() > 0.1
+    process = program.child.process
+    begin = time.perf_counter()
+    os.kill(process.pid, signal.SIGSTOP)  # as if the program took for ever
+    with pytest.raises(TimeUp), until(time.perf_counter() + 0.2):
+        program.solve(*arguments)
+    assert process.poll() is not None and time.perf_counter() - begin < 30
+    with pytest.raises(BackendError, match="exit code"), until(time.perf_counter() + 60):
+        monkeypatch.setattr(child, "SERVE", "raise SystemExit(3)")
+        program.solve(*arguments)
+    with until(time.perf_counter() + 60):
+        monkeypatch.undo()
+        program.solve(*arguments)
+        process = program.child.process
+    del program
+    assert process.wait(10) is not None  # it ends with what it was started for

@@ -28,11 +28,11 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
-from contactopt.analysis.paths import PathResult, follow
+from contactopt.analysis.constants import BELOW, FIRST, MOST_MEMORY, MOST_UNKNOWNS, SLOWEST, STUCK
+from contactopt.analysis.paths import solve_states
+from contactopt.analysis.progress import resident_memory
 from contactopt.analysis.quantities import QUANTITIES, at_rim, uncertainty
 from contactopt.analysis.solve_scene import Options, Solved
-from contactopt.analysis.zone import solve_zone
 from contactopt.bodies.refinement import split_scene
 from contactopt.checks import check_number
 from contactopt.errors import InputError
@@ -65,6 +65,11 @@ class Level:
     uncertainty: float
     seconds: float
 
+    @property
+    def mesh(self) -> str:
+        """What the mesh is, in words."""
+        return f"{self.elements} elements, {self.splits} splits"
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -96,11 +101,10 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A scene solved on one mesh; `path` if the scene has a load path, whose last state it then is."""
+    """A scene solved on one mesh, or the last state of its load path."""
 
     level: Level
     solved: Solved
-    path: PathResult | None = None
 
     @property
     def reduction(self) -> Reduction:
@@ -124,7 +128,7 @@ def refine(
     """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
 
     It ends short of the target, with a sentence in the estimate, where the quantity does not converge, where the next mesh
-    would have more than MOST_UNKNOWNS unknowns, or where a solve fails.
+    would have more than MOST_UNKNOWNS unknowns or take more than MOST_MEMORY bytes, or where a solve fails.
 
     Parameters
     ----------
@@ -200,6 +204,7 @@ class _Search:
     changes  changes[i] is the change of the value by split i + 1. There is one entry for every split of the present mesh;
              without a split there is still the first one, which was measured to learn what splits would do
     share    by which the first split multiplies the unknowns
+    before   memory of the process before the search [bytes];   each  that its meshes take for each unknown [bytes]
     """
 
     def __init__(self, states: tuple[Scene, ...], quantity: str, options: Options):
@@ -212,6 +217,7 @@ class _Search:
         self.meshes: list[Level] = []
         self.changes: list[float] = []
         self.splits, self.share = 0, 1.0
+        self.before, self.each = resident_memory(), 0.0
         self.last: Mesh | None = None
         self.split_last: Mesh | None = None
         self._refine_mesh()
@@ -281,9 +287,16 @@ class _Search:
         """A sentence if the next mesh passes the limit."""
         dim = self.states[-1].dim
         unknowns = growth * self.meshes[-1].unknowns * self.share**splits
-        if unknowns <= MOST_UNKNOWNS[dim]:
-            return ""
-        return f"to go on would take up to {unknowns:.2g} unknowns, more than {MOST_UNKNOWNS[dim]:,}"
+        if unknowns > MOST_UNKNOWNS[dim]:
+            return f"to go on would take up to {unknowns:.2g} unknowns, more than {MOST_UNKNOWNS[dim]:,}"
+        memory = self.each * (unknowns + self._held())
+        if memory > MOST_MEMORY:
+            return f"to go on would take about {memory / 1e9:.2g} GB of memory, more than {MOST_MEMORY / 1e9:.2g} GB"
+        return ""
+
+    def _held(self) -> int:
+        """Unknowns of the meshes that are kept while the next one is solved."""
+        return sum(mesh.level.unknowns for mesh in (self.last, self.split_last) if mesh is not None)
 
     def _refine_mesh(self) -> None:
         i = len(self.meshes)
@@ -292,6 +305,7 @@ class _Search:
 
     def _split(self, splits: int, elements: int) -> None:
         """Measure the change by a split."""
+        self.split_last = None  # its memory is needed
         known = {(level.elements, level.splits): level.value for level in self.levels}
         if (elements, splits - 1) not in known:
             known[elements, splits - 1] = self._solve(elements, splits - 1).level.value
@@ -305,14 +319,10 @@ class _Search:
         begin = time.perf_counter()
         base = elements if self.given else elements // 2**splits
         states = [split_scene(scene, base, splits) for scene in self.states]
-        path, options = None, self.options
-        if len(states) > 1:
-            path = follow(states, elements, Q=options.Q, solver=options.solver, **options.of_solve)
-            solved = Solved(path.reduction, path.solution)
-        else:
-            solved = solve_zone(states[0], elements, options, None if self.last is None else self.last.solved)
+        solved = solve_states(states, elements, self.options, None if self.last is None else self.last.solved)
         reduction, solution, zones = solved.reduction, solved.solution, solved.zones
         value = QUANTITIES[self.quantity](reduction, solution), uncertainty(self.quantity, reduction, solution)
         size = reduction.dofs, reduction.problem.contacts, max(1, len(zones) - 1), zones[-2] if zones else None
         self.levels.append(Level(elements, splits, *size, *value, time.perf_counter() - begin))
-        return Mesh(self.levels[-1], solved, path)
+        self.each = (resident_memory() - self.before) / (self._held() + reduction.dofs)
+        return Mesh(self.levels[-1], solved)

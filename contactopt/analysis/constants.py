@@ -23,6 +23,7 @@ ROUGH = 1e-6  # certificate asked of a coarse mesh: its own error is larger
 # Refinement (contactopt.analysis.accuracy).
 FIRST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least, by dimension
 BELOW = 8  # by how much fewer than the scene's default they are
-MOST_UNKNOWNS = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: about a gigabyte and half a minute
+MOST_UNKNOWNS = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: half a minute
+MOST_MEMORY = 2e9  # bytes that the search may take, by those that its meshes have taken for each unknown so far
 SLOWEST = 0.75  # least order that is believed: slower ones were noise wherever the exact value was known
 STUCK = 0.1  # order below which a sequence does not converge

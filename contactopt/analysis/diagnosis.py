@@ -48,6 +48,7 @@ import numpy as np
 import scipy.linalg as la
 
 from contactopt.analysis.status import contact_status
+from contactopt.cards import card, count, line
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution, balance_residual, dimensionless, natural_map_residual
 from contactopt.problem.cones import coulomb_cone
@@ -118,21 +119,21 @@ class Diagnosis:
     local: Local | None = None
 
     def __str__(self) -> str:
-        def line(name: str, field: str) -> str:
+        def threshold(name: str, what: str, field: str) -> str:
             low, high = getattr(self.guaranteed, field), getattr(self.uniform_slip, field)
             if self.exact:
-                return f"{name} for every load if and only if mu < {low:.4g}"
-            sure = f"for every load if mu < {low:.3g}" if low > 0 else "without guarantee"
-            return f"{name} {sure}" + ("" if np.isnan(high) else f", not for some load at mu = {high:.3g}")
+                return f"{name}: {what} for every load if and only if mu < {low:.4g}"
+            sure = f"{what} for every load if mu < {low:.3g}" if low > 0 else f"{what} is not guaranteed"
+            return f"{name}: {sure}" + ("" if np.isnan(high) else f"; it is lost for some load at mu = {high:.3g}")
 
         lines = [
-            f"{self.contacts} contacts in {self.dim}D, mu = {self.mu:g}",
+            f"{count(self.contacts, 'contact')} in {self.dim}D, mu = {self.mu:g}",
             f"Q: rank {self.rank} of {self.size} (held components: {self.held}), condition {self.condition:.2g}, "
-            f"unsymmetric by {self.asymmetry:.1g}"
+            f"asymmetry {self.asymmetry:.1g}"
             + (", not positive semidefinite" if self.least < -self.size * np.finfo(float).eps else ""),
-            line("one solution", "unique"),
-            line("Tresca iteration converges", "tresca"),
-            line("alternating iteration converges", "alternating"),
+            threshold("number of solutions", "uniqueness", "unique"),
+            threshold("Tresca iteration", "convergence", "tresca"),
+            threshold("alternating iteration", "convergence", "alternating"),
             f"convex relaxation: {self.relaxation}",
         ]
         if self.local is not None:
@@ -143,6 +144,17 @@ class Diagnosis:
                 f"isolated up to mu = {at.singular:.3g}"
             )
         return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        guaranteed = (
+            f"unique below mu = {self.guaranteed.unique:.3g}" if self.guaranteed.unique else "uniqueness not guaranteed"
+        )
+        contacts = f"{count(self.contacts, 'contact')} in {self.dim}D"
+        return line("Diagnosis", contacts, f"mu = {self.mu:g}", f"rank {self.rank} of {self.size}", guaranteed)
+
+    def _repr_html_(self) -> str:
+        parts = (text.partition(": ") for text in str(self).splitlines()[1:])
+        return card(str(self).splitlines()[0], {name: said for name, _, said in parts})
 
 
 def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Diagnosis:

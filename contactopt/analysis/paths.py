@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence, Sized
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -28,13 +28,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.analysis.edges import contact_edge, stick_edge
+from contactopt.analysis.solve_scene import Options, Solved, solve_loaded, solve_scene
 from contactopt.analysis.status import contact_status
+from contactopt.analysis.zone import solve_zone
+from contactopt.cards import card, count, line
 from contactopt.errors import InputError
 from contactopt.files import whole_folder
-from contactopt.interface.reduction import Reduction, reduce_bodies
+from contactopt.interface.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.scenes.scene import Scene
-from contactopt.solving.driver import solve
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +76,15 @@ class PathResult:
     states: tuple[State, ...]
     reduction: Reduction
 
+    def __repr__(self) -> str:
+        scene, solved = self.states[-1].scene, sum(state.solution.solved for state in self.states)
+        return line("PathResult", scene.name, count(len(self.states), "state"), f"{solved} solved")
+
+    def _repr_html_(self) -> str:
+        rows = {"states": len(self.states), "solved": sum(state.solution.solved for state in self.states)}
+        worst = max(float(state.solution.residual) for state in self.states)
+        return card(f"Load path of {self.states[-1].scene.name}", rows | {"largest residual": f"{worst:.2e}"})
+
     @property
     def solved(self) -> bool:
         return all(state.solution.solved for state in self.states)
@@ -81,7 +92,7 @@ class PathResult:
     @property
     def solution(self) -> Solution:
         """The last state's, with the seconds of the whole path."""
-        seconds = Counter(self.reduction.seconds)
+        seconds: Counter[str] = Counter()
         for state in self.states:
             seconds.update(state.solution.seconds)
         return replace(self.states[-1].solution, seconds=dict(seconds))
@@ -113,8 +124,13 @@ class PathResult:
         return history
 
     def write(self, out: str | Path) -> None:
-        """history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and displacements (n, k, dim)."""
+        """history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and displacements (n, k, dim).
+
+        It also has the bounds of the friction forces (n, k) and the status (n, k): 0 open, 1 stick, 2 slip.
+        """
         problem = self.reduction.problem
+        forces = [state.solution.reactions for state in self.states]
+        masks = [contact_status(problem, r) for r in forces]
         with whole_folder(out) as staging:
             with open(staging / "history.csv", "w", newline="") as file:
                 rows = csv.writer(file)
@@ -124,7 +140,9 @@ class PathResult:
                 staging / "path.npz",
                 coordinates=problem.coordinates,
                 areas=problem.areas,
-                reactions=[state.solution.reactions for state in self.states],
+                reactions=forces,
+                bounds=[problem.law.bound(r[:, 0]) for r in forces],
+                status=[mask.stick + 2 * mask.slip for mask in masks],
                 displacements=[state.displacements for state in self.states],
             )
 
@@ -145,7 +163,7 @@ def follow(
     scenes : states that differ in their loads only: forces, tractions, prescribed displacements
     elements : across the contact half-width; the scene's own number by default. One mesh serves the whole path.
     zone : half-width that the mesh resolves [length]; by default the scene's
-    note : receives one short sentence before every step that takes time
+    note : receives one short sentence after every state, "state 17 of 41: ..." where the number of states is known
     Q, solver : form of Q and solver of the bodies, as for reduce()
     settings : arguments of solve(). Each step starts from the solution of the one before.
 
@@ -159,22 +177,59 @@ def follow(
     """
     if not isinstance(scenes, Iterable) or isinstance(scenes, np.ndarray) or sp.issparse(scenes):
         raise InputError(f"a path is a list of scenes; got {type(scenes).__name__}.")
+    method, tol = settings.pop("method", None), settings.pop("tol", 1e-8)
+    return follow_states(scenes, elements, zone, Options(Q, solver, method, tol, settings, note))
+
+
+def follow_states(
+    scenes: Iterable[Scene], elements: int | None = None, zone: float | None = None, options: Options | None = None
+) -> PathResult:
+    """As follow(), with the options of contactopt.analysis.solve_scene."""
+    options = options or Options()
+    total = f" of {len(scenes)}" if isinstance(scenes, Sized) else ""
     states: list[State] = []
-    seconds: Counter[str] = Counter()
-    reduction: Reduction | None = None
-    last: _Mechanics | None = None
+    solved: Solved | None = None
+    mechanics: _Mechanics | None = None
     for scene in scenes:
-        reduction = reduce_bodies(scene, elements, zone, Q, solver) if reduction is None else reduction.loaded(scene)
-        seconds.update(reduction.seconds)
-        state, last = _step(reduction, states[-1] if states else None, last, settings)
+        if solved is None:
+            solved = solve_scene(scene, elements, zone, options)
+        else:
+            solved = solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
+        state, mechanics = _state(solved, states[-1] if states else None, mechanics)
         states.append(state)
-        note(f"state {len(states)}: {state.solution.status}, {state.solution.iterations} iterations")
+        steps = count(state.solution.iterations, "iteration")
+        options.note(f"state {len(states)}{total}: {state.solution.status}, {steps}")
         if not state.solution.solved:
             break
-    if reduction is None:
+    if solved is None:
         raise InputError("the path has no states; give at least one scene.")
-    end = replace(reduction.problem, q=states[-1].q)
-    return PathResult(tuple(states), replace(reduction, problem=end, seconds=dict(seconds)))
+    return PathResult(tuple(states), solved.reduction)
+
+
+def solve_states(
+    states: Sequence[Scene], elements: int | None = None, options: Options | None = None, start: Solved | None = None
+) -> Solved:
+    """Solve a scene on meshes fitted to its contact zone, or follow the load path of several states on one mesh.
+
+    Parameters
+    ----------
+    states : the scene, or the states of its load path
+    elements : across the contact half-width; the scene's own number by default
+    options : how each state is solved
+    start : the scene solved on another mesh, to start from; a path starts from the unloaded bodies
+
+    Returns
+    -------
+    Solved : the scene, or the last state of the path with the whole path
+
+    Raises
+    ------
+    InputError : as solve_zone() and follow()
+    """
+    if len(states) == 1:
+        return solve_zone(states[0], elements, options, start)
+    path = follow_states(states, elements, None, options)
+    return Solved(path.reduction, path.solution, path=path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,35 +244,28 @@ class _Mechanics:
     elastic: float = 0.0
 
 
-def _mechanics(reduction: Reduction, solution: Solution) -> _Mechanics:
-    """The state of the bodies under contact forces and plate displacements."""
+def _state(solved: Solved, before: State | None, last: _Mechanics | None) -> tuple[State, _Mechanics]:
+    """What is kept of a state, given the one before it, and the state of the bodies."""
+    reduction, solution = solved.reduction, solved.solution
     problem, r = reduction.problem, solution.reactions
+    gap, earlier = np.zeros(r.shape), np.zeros(r.shape)
+    gap[:, 0] = reduction.gap
+    if before is not None:
+        earlier[:, 1:] = before.displacements[:, 1:]
     U = list(reduction.displaced(r, solution.multipliers))
     F = [body.external_forces(own) for body, own in zip(reduction.bodies, U)]
     elastic = sum(body.energy(own) for body, own in zip(reduction.bodies, U))
-    return _Mechanics(r, problem.displacements(r, solution.multipliers), U, F, elastic)
-
-
-def _step(
-    reduction: Reduction, before: State | None, last: _Mechanics | None, settings: dict[str, Any]
-) -> tuple[State, _Mechanics]:
-    problem = reduction.problem
-    earlier = np.zeros((problem.contacts, problem.dim - 1)) if before is None else before.displacements[:, 1:]
-    q = problem.q.copy()
-    q[:, 1:] -= earlier
-    solution = solve(replace(problem, q=q), start=None if before is None else before.solution, **settings)
-    now, gap = _mechanics(reduction, solution), np.zeros(q.shape)
-    gap[:, 0] = reduction.gap
+    now = _Mechanics(r, problem.displacements(r, solution.multipliers) + earlier, U, F, elastic)
     if last is None:  # the unloaded bodies
         last = _Mechanics(0 * now.r, gap, [0 * U for U in now.U], [0 * F for F in now.F])
-    moved = problem.displacements(0 * now.r, solution.multipliers) - gap
+    moved = problem.displacements(0 * r, solution.multipliers) + earlier - gap
     state = State(
         reduction.scene,
         solution,
-        q,
+        problem.q,
         problem.s,
         now.u,
-        now.u[:, 1:] - earlier,
+        (now.u - earlier)[:, 1:],
         np.average(moved, axis=0, weights=problem.areas),
         now.elastic,
         external=sum(float((F + F0) @ (U - U0)) for F, F0, U, U0 in zip(now.F, last.F, now.U, last.U)) / 2,
@@ -245,5 +293,5 @@ def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
         "step_work": state.contact,
         "residual": float(state.solution.residual),
         "iterations": state.solution.iterations,
-        "seconds": float(sum(state.solution.seconds.values())),
+        "seconds": float(sum(state.solution.seconds[phase] for phase in ("solve", "certificate"))),
     }

@@ -7,6 +7,7 @@ import resource
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import InterfaceOperator
@@ -53,3 +54,11 @@ def peak_memory() -> float:
     """Largest memory of this process so far in bytes."""
     size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return float(size if sys.platform == "darwin" else 1024 * size)
+
+
+def resident_memory() -> float:
+    """Memory of this process now in bytes; 0 where the system does not tell."""
+    try:
+        return float(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+    except OSError:
+        return 0.0

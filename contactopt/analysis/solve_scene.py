@@ -1,7 +1,8 @@
 """The one place that solves a scene: reduce it to its interface, find a start, solve.
 
-Whatever solves scenes is a loop around solve_scene(): contactopt.analysis.zone remeshes to the contact zone,
-contactopt.analysis.accuracy refines meshes around that.
+Whatever solves scenes is a loop around the two functions of this module. solve_scene() begins with a scene. solve_loaded() goes
+on with the same bodies under other loads. contactopt.analysis.zone remeshes to the contact zone, contactopt.analysis.paths
+follows a load path, and contactopt.analysis.accuracy refines meshes around both.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from contactopt.analysis.constants import COARSEST, FACTOR, ROUGH
 from contactopt.analysis.progress import progress_lines
@@ -23,6 +26,9 @@ from contactopt.problem.transfer import transfer
 from contactopt.scenes.scene import Scene
 from contactopt.solving.driver import solve
 from contactopt.solving.methods import Method
+
+if TYPE_CHECKING:
+    from contactopt.analysis.paths import PathResult
 
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
@@ -65,11 +71,13 @@ class Solved:
 
     zones  half-widths of the contact zone [length]: for which the first mesh was made, and read from each solution; none
            if the scene has no zone
+    path   all states of a load path, of which this is the last one; None where there is one state only
     """
 
     reduction: Reduction
     solution: Solution
     zones: tuple[float, ...] = ()
+    path: PathResult | None = None
 
 
 def solve_scene(
@@ -98,7 +106,7 @@ def solve_scene(
     elements = scene.elements if elements is None else elements
     options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
     reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver)
-    seconds = Counter(reduction.seconds)
+    coarse: dict[str, float] = {}
     operator = reduction.problem.Q
     products = isinstance(operator, InterfaceOperator) and operator.coupled is None
     products = products and not isinstance(operator, Convolution)  # half-spaces have coarse grids of their own
@@ -106,11 +114,44 @@ def solve_scene(
     if start is None and products and not scene.given and coarser >= COARSEST:
         begin = time.perf_counter()
         start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
-        seconds.update({"coarse": time.perf_counter() - begin})
+        coarse = {"coarse": time.perf_counter() - begin}
     options.note(f"solving {reduction.problem.contacts} contacts")
     first = None if start is None else transfer(start.reduction.problem, start.solution, reduction.problem)
+    solved = _solved(reduction, first, options, coarse)
+    log.info("%s: %d elements, %s", scene.name, elements, solved.solution.status)
+    return solved
+
+
+def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Options) -> Solved:
+    """Solve the next state of a load path: the same bodies, coupling and Q under other loads.
+
+    Parameters
+    ----------
+    scene : the state, which differs from the one before in its loads only
+    before : the state before, whose solution is the start
+    slipped : (k, dim - 1) tangential displacements of the contacts in the state before, from which slip is measured [length]
+    options : how to solve it; the form of Q and the bodies' solvers stay those of `before`
+
+    Returns
+    -------
+    Solved : whose problem is that of this step alone
+
+    Raises
+    ------
+    InputError : if more than loads and friction differ
+    """
+    reduction = before.reduction.loaded(scene)
+    q = reduction.problem.q.copy()
+    q[:, 1:] -= slipped
+    step = replace(reduction, problem=replace(reduction.problem, q=q))
+    return _solved(step, before.solution, options, {})
+
+
+def _solved(reduction: Reduction, start: Solution | None, options: Options, earlier: Mapping[str, float]) -> Solved:
+    """The solution of a reduced scene, with the seconds of the reduction, of the solve and of what came earlier."""
     lines = progress_lines(options.note, reduction.problem, options.tol)
-    solution = solve(reduction.problem, start=first, **({"progress": lines} | options.of_solve))
+    solution = solve(reduction.problem, start=start, **({"progress": lines} | options.of_solve))
+    seconds = Counter(reduction.seconds)
+    seconds.update(earlier)
     seconds.update(solution.seconds)
-    log.info("%s: %d elements, %s after %d iterations", scene.name, elements, solution.status, solution.iterations)
     return Solved(reduction, replace(solution, seconds=dict(seconds)))

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
 
 from contactopt.analytic.reference import Reference
 from contactopt.checks import check_number, check_positive
 from contactopt.errors import InputError
 from contactopt.material import Material
-
-# the tangent of half the semi-angle of contact with no clearance at all: the root of 2 = ln(1 + b^2) + 2 b^4
-FULL = brentq(lambda b: np.log1p(b**2) + 2 * b**4 - 2, 0.5, 1.0, xtol=1e-15)
 
 
 def pin_in_hole(force_per_length: float, radius: float, clearance: float, modulus: float) -> Reference:
@@ -35,6 +31,8 @@ def pin_in_hole(force_per_length: float, radius: float, clearance: float, modulu
     (2001), The state of stress induced by the plane frictionless cylindrical contact. I. The case of elastic similarity, Int. J.
     Solids Struct. 38, 4507-4523.
     """
+    from scipy.optimize import brentq
+
     check_positive(force_per_length=force_per_length, radius=radius, clearance=clearance, modulus=modulus)
     ratio = 2 * modulus * clearance / force_per_length
 
@@ -42,7 +40,9 @@ def pin_in_hole(force_per_length: float, radius: float, clearance: float, modulu
         b = np.exp(s)
         return float(2 - np.log1p(b**2) - 2 * b**4 - ratio * np.pi * b**2 * (1 + b**2))
 
-    b = float(np.exp(brentq(excess, np.log(1e-8), np.log(FULL), xtol=1e-15)))
+    # with no clearance at all contact ends at the root of 2 = ln(1 + b^2) + 2 b^4
+    full = brentq(lambda b: np.log1p(b**2) + 2 * b**4 - 2, 0.5, 1.0, xtol=1e-15)
+    b = float(np.exp(brentq(excess, np.log(1e-8), np.log(full), xtol=1e-15)))
 
     def pressure(x: np.ndarray) -> np.ndarray:
         angle = np.abs(np.asarray(x, dtype=float)) / radius

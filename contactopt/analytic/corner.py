@@ -50,14 +50,30 @@ def corner(
     mu: float | None = 0.0,
     angles: tuple[float, float] = (np.pi / 2, np.pi),
 ) -> Corner:
-    """The strongest singular field where a body's edge lies on another body, plane strain.
+    """The strongest singular field where the edge of a body lies on another body; plane strain.
 
-    upper, lower  materials, None for a rigid body
-    mu            shear traction over pressure on the sliding interface [-], positive where the lower body is pushed
-                  away from the contact's centre (its sign follows the slip); 0 frictionless, None bonded
-    angles        of the upper and the lower body at the corner [rad], up to 2 pi
-    Poisson's ratio enters through Dundurs' constants only; equal materials give an exponent free of it. Raises
-    InputError for two rigid bodies or angles out of range.
+    Poisson's ratio enters through Dundurs' constants only. Equal materials give an exponent that does not depend on
+    it.
+
+    Parameters
+    ----------
+    upper, lower
+        Materials; None is a rigid body.
+    mu
+        Shear traction over pressure on the sliding interface [-], positive where the lower body is pushed away from
+        the centre of the contact; its sign follows the slip. 0 is frictionless, None is bonded.
+    angles
+        Of the upper and of the lower body at the corner [rad], up to 2 pi.
+
+    Returns
+    -------
+    Corner
+        Exponent, oscillation, and ratio of the tractions.
+
+    Raises
+    ------
+    InputError
+        For two rigid bodies, or angles out of range.
     """
     if upper is None and lower is None:
         raise InputError("both bodies are rigid; at least one must be elastic.")

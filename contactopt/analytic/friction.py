@@ -21,11 +21,32 @@ from contactopt.checks import check_number, check_positive
 
 
 def flat_punch_line_friction(force_per_length: float, half_width: float, mu: float, beta: float) -> Reference:
-    """Rigid flat punch pressed on a half-plane with Coulomb friction, from zero load.
+    """A rigid flat punch pressed on a half-plane with Coulomb friction, from zero load.
 
-    force_per_length [force/length], half_width a [length], mu >= 0 [-], beta as in dundurs [-]: for a rigid punch
-    (1 - 2 nu)/(2 (1 - nu)). Fully coupled equations and sources: contactopt.analytic.spence. c/a within 1e-6; tractions
-    within 1e-5 of themselves, at the edges ~ (a - |x|)^(atan(mu |beta|)/pi - 1/2). Raises InputError out of range.
+    The fully coupled equations and their sources stand in contactopt.analytic.spence. The stick ratio c / a is right
+    to 1e-6, and the tractions to 1e-5 of themselves. At the edges they grow like (a - |x|)^(atan(mu |beta|) / pi -
+    1/2).
+
+    Parameters
+    ----------
+    force_per_length
+        Normal force per length of the contact, positive in compression [force / length].
+    half_width
+        Half-width a of the punch [length].
+    mu
+        Friction coefficient, at least 0 [-].
+    beta
+        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+
+    Returns
+    -------
+    Reference
+        Pressure and shear traction, half-width of contact and stick.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(flat_punch_line(force_per_length, half_width), mu)
@@ -34,9 +55,32 @@ def flat_punch_line_friction(force_per_length: float, half_width: float, mu: flo
 
 
 def flat_punch_axisymmetric_friction(force: float, radius: float, modulus: float, mu: float, beta: float) -> Reference:
-    """Rigid circular flat punch pressed on a half-space with Coulomb friction, from zero load.
+    """A rigid circular flat punch pressed on a half-space with Coulomb friction, from zero load.
 
-    force [force], radius a [length], modulus E* [stress]; mu, beta and accuracy as in flat_punch_line_friction.
+    The accuracy is that of flat_punch_line_friction().
+
+    Parameters
+    ----------
+    force
+        Normal force, positive in compression [force].
+    radius
+        Radius a of the punch [length].
+    modulus
+        Contact modulus E* as in contact_modulus() [stress].
+    mu
+        Friction coefficient, at least 0 [-].
+    beta
+        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+
+    Returns
+    -------
+    Reference
+        Pressure and shear traction, half-width of contact and stick, and approach.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(flat_punch_axisymmetric(force, radius, modulus), mu)
@@ -46,13 +90,34 @@ def flat_punch_axisymmetric_friction(force: float, radius: float, modulus: float
 
 
 def hertz_line_friction(force_per_length: float, radius: float, modulus: float, mu: float, beta: float) -> Reference:
-    """Cylinder on a half-plane of another material, Coulomb friction, growing load.
+    """A cylinder on a half-plane of another material with Coulomb friction, under a load that never fell.
 
-    While the load grows by dP the contact is that of a rigid flat punch of its present half-width a, so that
-        p(x) = int_|x|^a p_punch(x; a') dP/da' da', dP/da' ~ a', and q alike,
-    with the punch's c/a; a follows from the slope -x/R of the surface. force_per_length [force/length], radius R
-    [length], modulus E* [stress], mu >= 0 and beta as in contact_modulus and dundurs [-]. Valid for a << R and a load
-    that never fell. Source: Spence (1975), J. Elasticity 5, 297-319. Raises InputError out of range.
+    While the load grows by dP the contact is that of a rigid flat punch of its present half-width a. The tractions
+    are therefore an integral over those of growing punches, with their ratio c / a, and a follows from the slope -x /
+    R of the surface. This holds for a much smaller than R. Source: Spence (1975), J. Elasticity 5, 297-319.
+
+    Parameters
+    ----------
+    force_per_length
+        Normal force per length of the contact, positive in compression [force / length].
+    radius
+        Radius R of the round body; the sum of curvatures is 1 / R where both are round [length].
+    modulus
+        Contact modulus E* as in contact_modulus() [stress].
+    mu
+        Friction coefficient, at least 0 [-].
+    beta
+        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+
+    Returns
+    -------
+    Reference
+        Pressure and shear traction, half-width of contact and stick.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(hertz_line(force_per_length, radius, modulus), mu)
@@ -66,10 +131,34 @@ def hertz_line_friction(force_per_length: float, radius: float, modulus: float, 
 
 
 def hertz_point_friction(force: float, radius: float, modulus: float, mu: float, beta: float) -> Reference:
-    """Sphere on a half-space of another material, Coulomb friction, growing load.
+    """A sphere on a half-space of another material with Coulomb friction, under a load that never fell.
 
-    As hertz_line_friction with dP/da' ~ a'^2; a and the approach follow from the depth approach - r^2/(2 R) of the
-    surface. force [force].
+    As in hertz_line_friction(), the tractions are an integral over those of growing flat punches, where dP / da is
+    proportional to a^2. The contact radius and the approach follow from the depth of the surface, approach - r^2 / (2
+    R).
+
+    Parameters
+    ----------
+    force
+        Normal force, positive in compression [force].
+    radius
+        Radius R of the round body; the sum of curvatures is 1 / R where both are round [length].
+    modulus
+        Contact modulus E* as in contact_modulus() [stress].
+    mu
+        Friction coefficient, at least 0 [-].
+    beta
+        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+
+    Returns
+    -------
+    Reference
+        Pressure and shear traction, half-width of contact and stick, and approach.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range.
     """
     if not _slips(mu, beta):
         return _without_slip(hertz_point(force, radius, modulus), mu)

@@ -26,12 +26,35 @@ from contactopt.errors import InputError
 def hertz_line_tangential(
     force_per_length: float, radius: float, modulus: float, mu: float, loads: float | Sequence[float]
 ) -> Reference:
-    """Cylinders under P and then T [force/length]; E* `modulus` [stress].
+    """Cylinders under a normal force P and then a tangential force T (Cattaneo, Mindlin).
 
-    loads  the present T, or the turning points of T so far and the present one; |T| <= mu P
-    The shift is the part that slip adds to that of a full stick, which is linear in T and depends on the bodies: when
-    rising, (mu P/(pi E*)) [(1 - x) ln(1 - x) + x], from the displacement at the centre, Johnson (1985), eq (2.24).
-    Raises InputError if |T| exceeds mu P.
+    The shift is the part that slip adds to the displacement of full stick, which is linear in T and depends on the
+    bodies. While T rises it is (mu P / (pi E*)) [(1 - x) ln(1 - x) + x] with x = T / (mu P), from the displacement at
+    the centre: Johnson (1985), eq (2.24).
+
+    Parameters
+    ----------
+    force_per_length
+        Normal force per length of the contact, positive in compression [force / length].
+    radius
+        Radius R of the round body; the sum of curvatures is 1 / R where both are round [length].
+    modulus
+        Contact modulus E* as in contact_modulus() [stress].
+    mu
+        Friction coefficient, at least 0 [-].
+    loads
+        The present tangential force T, or its turning points so far and the present one; |T| <= mu P [force /
+        length].
+
+    Returns
+    -------
+    Reference
+        Pressure and shear traction over the place, half-width of contact and stick, and shift.
+
+    Raises
+    ------
+    InputError
+        If |T| exceeds mu P, or an argument is not positive.
     """
     normal = hertz_line(force_per_length, radius, modulus)
     limit = _limit(mu, force_per_length)
@@ -45,9 +68,34 @@ def hertz_line_tangential(
 def hertz_point_tangential(
     force: float, radius: float, modulus: float, tangential: float, mu: float, loads: float | Sequence[float]
 ) -> Reference:
-    """Spheres under P and then T [force]; E* `modulus` [stress], Gs `tangential` [stress] as in tangential_modulus.
+    """Spheres under a normal force P and then a tangential force T (Cattaneo, Mindlin).
 
-    loads as in hertz_line_tangential. Fields are functions of r. Rising shift: 3 mu P/(16 a Gs) [1 - (1 - x)^(2/3)].
+    While T rises the shift is 3 mu P / (16 a Gs) [1 - (1 - x)^(2/3)] with x = T / (mu P).
+
+    Parameters
+    ----------
+    force
+        Normal force, positive in compression [force].
+    radius
+        Radius R of the round body; the sum of curvatures is 1 / R where both are round [length].
+    modulus
+        Contact modulus E* as in contact_modulus() [stress].
+    tangential
+        Tangential modulus Gs as in tangential_modulus() [stress].
+    mu
+        Friction coefficient, at least 0 [-].
+    loads
+        The present tangential force T, or its turning points so far and the present one; |T| <= mu P [force].
+
+    Returns
+    -------
+    Reference
+        Pressure and shear traction over the radius, radius of contact and stick, approach, and shift.
+
+    Raises
+    ------
+    InputError
+        If |T| exceeds mu P, or an argument is not positive.
     """
     check_positive(tangential_modulus=tangential)
     normal = hertz_point(force, radius, modulus)
@@ -57,10 +105,31 @@ def hertz_point_tangential(
 
 
 def cycle_loss_line(force_per_length: float, modulus: float, mu: float, amplitude: float) -> float:
-    """Energy lost per cycle of T between +-amplitude, cylinders [force]: per length.
+    """Energy that cylinders lose per cycle of a tangential force between plus and minus an amplitude.
 
-    4 mu^2 P^2/(pi E*) [(1 - x) ln(1 - x) + x - x^2/2]: the area of the loop that Masing's rules draw from the shift in
-    hertz_line_tangential. Raises InputError if the amplitude exceeds mu P.
+    The loss is 4 mu^2 P^2 / (pi E*) [(1 - x) ln(1 - x) + x - x^2 / 2] with x = amplitude / (mu P). This is the area
+    of the loop that Masing's rules draw from the shift of hertz_line_tangential().
+
+    Parameters
+    ----------
+    force_per_length
+        Normal force per length of the contact, positive in compression [force / length].
+    modulus
+        Contact modulus E* as in contact_modulus() [stress].
+    mu
+        Friction coefficient, at least 0 [-].
+    amplitude
+        Largest tangential force per length [force / length].
+
+    Returns
+    -------
+    float
+        Energy per length and cycle [force].
+
+    Raises
+    ------
+    InputError
+        If the amplitude exceeds mu P, or an argument is not positive.
     """
     check_positive(force_per_length=force_per_length, modulus=modulus)
     limit = _limit(mu, force_per_length)
@@ -72,10 +141,35 @@ def cycle_loss_line(force_per_length: float, modulus: float, mu: float, amplitud
 def cycle_loss_point(
     force: float, radius: float, modulus: float, tangential: float, mu: float, amplitude: float
 ) -> float:
-    """Energy lost per cycle of T between +-amplitude, spheres [force length].
+    """Energy that spheres lose per cycle of a tangential force between plus and minus an amplitude.
 
-    9 mu^2 P^2/(10 a Gs) {1 - (1 - x)^(5/3) - (5 x/6) [1 + (1 - x)^(2/3)]}. Arguments as in hertz_point_tangential.
-    Source: Mindlin and Deresiewicz (1953); Johnson (1985), section 7.4. InputError if the amplitude exceeds mu P.
+    The loss is 9 mu^2 P^2 / (10 a Gs) {1 - (1 - x)^(5/3) - (5 x / 6) [1 + (1 - x)^(2/3)]} with x = amplitude / (mu
+    P). Sources: Mindlin, Deresiewicz (1953); Johnson (1985), Contact Mechanics, section 7.4.
+
+    Parameters
+    ----------
+    force
+        Normal force, positive in compression [force].
+    radius
+        Radius R of the round body; the sum of curvatures is 1 / R where both are round [length].
+    modulus
+        Contact modulus E* as in contact_modulus() [stress].
+    tangential
+        Tangential modulus Gs as in tangential_modulus() [stress].
+    mu
+        Friction coefficient, at least 0 [-].
+    amplitude
+        Largest tangential force [force].
+
+    Returns
+    -------
+    float
+        Energy per cycle [force length].
+
+    Raises
+    ------
+    InputError
+        If the amplitude exceeds mu P, or an argument is not positive.
     """
     check_positive(tangential_modulus=tangential)
     a = hertz_point(force, radius, modulus).half_width
@@ -86,7 +180,21 @@ def cycle_loss_point(
 
 
 def masing_branches(loads: Sequence[float]) -> list[tuple[float, float]]:
-    """The history that still counts: (change of load, 1 on the first loading and 2 after a reversal), oldest first."""
+    """The part of a history of loads that still counts, by Masing's rules.
+
+    A loop that is closed is forgotten, and so is everything once the load passes its largest size so far.
+
+    Parameters
+    ----------
+    loads
+        Turning points of the load, oldest first, with the present load at the end.
+
+    Returns
+    -------
+    list of (float, float)
+        For each branch the change of the load along it, and 1 on the first loading or 2 after a reversal; oldest
+        first.
+    """
     points = [0.0]
     for load in loads:
         if len(points) > 1 and (points[-1] - points[-2]) * (load - points[-1]) >= 0:

@@ -9,10 +9,30 @@ from contactopt.checks import check_positive
 
 
 def hertz_point(force: float, radius: float, modulus: float) -> Reference:
-    """Sphere of that radius on a half-space: a^3 = 3 P R / (4 E*), p = p0 sqrt(1 - r^2/a^2), approach a^2 / R.
+    """A sphere pressed on a half-space (Hertz).
 
-    force [force], radius [length], modulus E* [stress]. p0 = 3 P / (2 pi a^2). Frictionless, or with friction between
-    similar materials (beta = 0); valid for a << R. Source: Johnson (1985), Contact Mechanics, section 4.2(a).
+    The contact radius has a^3 = 3 P R / (4 E*). The pressure is p0 sqrt(1 - r^2 / a^2) with p0 = 3 P / (2 pi a^2),
+    and the approach of distant points is a^2 / R. This holds for a much smaller than R, without friction or between
+    similar materials (beta = 0). Source: Johnson (1985), Contact Mechanics, section 4.2(a).
+
+    Parameters
+    ----------
+    force
+        Normal force, positive in compression [force].
+    radius
+        Radius R of the round body; the sum of curvatures is 1 / R where both are round [length].
+    modulus
+        Contact modulus E* as in contact_modulus() [stress].
+
+    Returns
+    -------
+    Reference
+        Pressure over the radius, contact radius, peak and approach.
+
+    Raises
+    ------
+    InputError
+        If an argument is not positive or not finite.
     """
     check_positive(force=force, radius=radius, modulus=modulus)
     a = (3 * force * radius / (4 * modulus)) ** (1 / 3)
@@ -21,9 +41,30 @@ def hertz_point(force: float, radius: float, modulus: float) -> Reference:
 
 
 def hertz_line(force_per_length: float, radius: float, modulus: float) -> Reference:
-    """Cylinder on a half-plane: a^2 = 4 P R / (pi E*), p = p0 sqrt(1 - x^2/a^2); the approach depends on the bodies.
+    """A cylinder pressed on a half-plane (Hertz).
 
-    p0 = 2 P / (pi a). Validity as for hertz_point. Source: Johnson (1985), Contact Mechanics, section 4.2(c).
+    The contact half-width has a^2 = 4 P R / (pi E*). The pressure is p0 sqrt(1 - x^2 / a^2) with p0 = 2 P / (pi a).
+    There is no approach, which depends on the size of the bodies. The solution is valid where that of hertz_point()
+    is. Source: Johnson (1985), Contact Mechanics, section 4.2(c).
+
+    Parameters
+    ----------
+    force_per_length
+        Normal force per length of the contact, positive in compression [force / length].
+    radius
+        Radius R of the round body; the sum of curvatures is 1 / R where both are round [length].
+    modulus
+        Contact modulus E* as in contact_modulus() [stress].
+
+    Returns
+    -------
+    Reference
+        Pressure over the place, half-width and peak.
+
+    Raises
+    ------
+    InputError
+        If an argument is not positive or not finite.
     """
     check_positive(force_per_length=force_per_length, radius=radius, modulus=modulus)
     a = float(np.sqrt(4 * force_per_length * radius / (np.pi * modulus)))
@@ -32,9 +73,26 @@ def hertz_line(force_per_length: float, radius: float, modulus: float) -> Refere
 
 
 def flat_punch_line(force_per_length: float, half_width: float) -> Reference:
-    """Rigid flat punch on a half-plane, frictionless: p = P / (pi sqrt(a^2 - x^2)).
+    """A rigid flat punch on a half-plane without friction:  p = P / (pi sqrt(a^2 - x^2)).
 
     Source: Johnson (1985), Contact Mechanics, section 2.8(a).
+
+    Parameters
+    ----------
+    force_per_length
+        Normal force per length of the contact, positive in compression [force / length].
+    half_width
+        Half-width a of the punch [length].
+
+    Returns
+    -------
+    Reference
+        Pressure over the place, and the half-width.
+
+    Raises
+    ------
+    InputError
+        If an argument is not positive or not finite.
     """
     check_positive(force_per_length=force_per_length, half_width=half_width)
     pressure = under_punch(lambda u: force_per_length / np.pi + 0 * u, half_width, 1)
@@ -42,9 +100,28 @@ def flat_punch_line(force_per_length: float, half_width: float) -> Reference:
 
 
 def flat_punch_axisymmetric(force: float, radius: float, modulus: float) -> Reference:
-    """Rigid circular flat punch on a half-space, frictionless: p = P / (2 pi a sqrt(a^2 - r^2)), approach P / (2 a E*).
+    """A rigid circular flat punch on a half-space without friction:  p = P / (2 pi a sqrt(a^2 - r^2)).
 
-    force [force], radius a [length], modulus E* [stress]. Source: Johnson (1985), Contact Mechanics, section 3.4.
+    The approach is P / (2 a E*). Source: Johnson (1985), Contact Mechanics, section 3.4.
+
+    Parameters
+    ----------
+    force
+        Normal force, positive in compression [force].
+    radius
+        Radius a of the punch [length].
+    modulus
+        Contact modulus E* as in contact_modulus() [stress].
+
+    Returns
+    -------
+    Reference
+        Pressure over the radius, contact radius and approach.
+
+    Raises
+    ------
+    InputError
+        If an argument is not positive or not finite.
     """
     check_positive(force=force, radius=radius, modulus=modulus)
     pressure = under_punch(lambda u: force / (2 * np.pi) + 0 * u, radius, 2)
@@ -52,11 +129,30 @@ def flat_punch_axisymmetric(force: float, radius: float, modulus: float) -> Refe
 
 
 def flat_punch_line_bonded(force_per_length: float, half_width: float, beta: float) -> Reference:
-    """Rigid flat punch bonded to a half-plane: p + i q = P / (pi sqrt((1 - beta^2)(a^2 - x^2))) e^(2 i eta u).
+    """A rigid flat punch bonded to a half-plane:  p + i q = P / (pi sqrt((1 - beta^2) (a^2 - x^2))) e^(2 i eta u).
 
-    u = artanh(x/a), eta = artanh(beta)/pi; on a half-plane of Poisson's ratio nu beta = (1 - 2 nu)/(2 (1 - nu)) and
-    eta = ln(3 - 4 nu)/(2 pi). Exact for the linear problem, whose tractions change sign without end within
-    a - |x| ~ 2 a e^(-pi / (2 eta)) of the edges. Source: Johnson (1985), Contact Mechanics, section 2.8(b).
+    Here u = artanh(x / a) and eta = artanh(beta) / pi; on a half-plane of Poisson's ratio nu, eta = ln(3 - 4 nu) / (2
+    pi). The solution is exact for the linear problem. Its tractions change sign without end within about 2 a e^(-pi /
+    (2 eta)) of the edges. Source: Johnson (1985), Contact Mechanics, section 2.8(b).
+
+    Parameters
+    ----------
+    force_per_length
+        Normal force per length of the contact, positive in compression [force / length].
+    half_width
+        Half-width a of the punch [length].
+    beta
+        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+
+    Returns
+    -------
+    Reference
+        Pressure and shear traction over the place, and the half-width.
+
+    Raises
+    ------
+    InputError
+        If an argument is not positive or not finite.
     """
     check_positive(force_per_length=force_per_length, half_width=half_width)
     check_beta(beta)
@@ -71,12 +167,34 @@ def flat_punch_line_bonded(force_per_length: float, half_width: float, beta: flo
 
 
 def flat_punch_axisymmetric_bonded(force: float, radius: float, modulus: float, beta: float) -> Reference:
-    """Rigid circular flat punch bonded to a half-space: approach (P / (2 a E*)) beta / artanh(beta).
+    """A rigid circular flat punch bonded to a half-space:  approach (P / (2 a E*)) beta / artanh(beta).
 
-    Abel transforms of the tractions, P(t) = int_t^a r p / sqrt(r^2 - t^2) dr and Q(t) = t int_t^a q / sqrt(r^2 -
-    t^2) dr, are P + i Q = D cosh(pi eta) e^(2 i eta u), u = artanh(t/a), D = E* approach / 2, eta = artanh(beta)/pi.
-    The stiffness over the frictionless one is (1 - nu) ln(3 - 4 nu)/(1 - 2 nu). Edges as in flat_punch_line_bonded.
-    Source: Mossakovskii (1954), PMM 18, 187-196; Spence (1968), Proc. R. Soc. A 305, 55-80.
+    The Abel transforms of the tractions are P(t) = int_t^a r p / sqrt(r^2 - t^2) dr and Q(t) = t int_t^a q / sqrt(r^2
+    - t^2) dr. They are P + i Q = D cosh(pi eta) e^(2 i eta u) with u = artanh(t / a), D = E* approach / 2 and eta =
+    artanh(beta) / pi. The stiffness over that without friction is (1 - nu) ln(3 - 4 nu) / (1 - 2 nu). At the edges
+    the tractions behave as in flat_punch_line_bonded(). Sources: Mossakovskii (1954), PMM 18, 187-196; Spence (1968),
+    Proc. R. Soc. A 305, 55-80.
+
+    Parameters
+    ----------
+    force
+        Normal force, positive in compression [force].
+    radius
+        Radius a of the punch [length].
+    modulus
+        Contact modulus E* as in contact_modulus() [stress].
+    beta
+        Dundurs' constant as in dundurs(), of size below one [-]; (1 - 2 nu) / (2 (1 - nu)) under a rigid punch.
+
+    Returns
+    -------
+    Reference
+        Pressure and shear traction over the radius, contact radius and approach.
+
+    Raises
+    ------
+    InputError
+        If an argument is not positive or not finite.
     """
     check_positive(force=force, radius=radius, modulus=modulus)
     check_beta(beta)

@@ -40,29 +40,75 @@ class Reference:
 
 
 def contact_modulus(first: Material | None, second: Material | None = None) -> float:
-    """E* with 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 [stress]; None is a rigid body.
+    """The contact modulus E* with 1 / E* = (1 - nu1^2) / E1 + (1 - nu2^2) / E2.
 
-    Source: Johnson (1985), Contact Mechanics, section 4.2. Raises InputError if both bodies are rigid.
+    Source: Johnson (1985), Contact Mechanics, section 4.2.
+
+    Parameters
+    ----------
+    first, second
+        Materials of the two bodies; None is a rigid body.
+
+    Returns
+    -------
+    float
+        E* [stress].
+
+    Raises
+    ------
+    InputError
+        If both bodies are rigid.
     """
     return 1 / sum((1 - m.nu**2) / m.E for m in _elastic(first, second))
 
 
 def tangential_modulus(first: Material | None, second: Material | None = None) -> float:
-    """Gs with 1/Gs = (2 - nu1)/G1 + (2 - nu2)/G2 [stress]; None is a rigid body.
+    """The tangential modulus Gs with 1 / Gs = (2 - nu1) / G1 + (2 - nu2) / G2.
 
-    A circular contact of radius a without slip has the tangential stiffness 8 a Gs. Source: Johnson (1985), section
-    7.2. Raises InputError if both bodies are rigid.
+    A circular contact of radius a without slip has the tangential stiffness 8 a Gs. Source: Johnson (1985), Contact
+    Mechanics, section 7.2.
+
+    Parameters
+    ----------
+    first, second
+        Materials of the two bodies; None is a rigid body.
+
+    Returns
+    -------
+    float
+        Gs [stress].
+
+    Raises
+    ------
+    InputError
+        If both bodies are rigid.
     """
     return 1 / sum((2 - m.nu) * 2 * (1 + m.nu) / m.E for m in _elastic(first, second))
 
 
 def dundurs(upper: Material | None, lower: Material | None) -> tuple[float, float]:
-    """Dundurs' constants (alpha, beta) [-] of two bodies in plane strain; None is a rigid body.
+    """Dundurs' constants of two bodies in plane strain.
 
-    alpha = (A2 - A1)/(A2 + A1), beta = (B2 - B1)/(A2 + A1) with A = (1 - nu)/G, B = (1 - 2 nu)/(2 G): zero for equal
-    materials, positive where the upper body is the stiffer. A rigid upper body has alpha = 1 and
-    beta = (1 - 2 nu)/(2 (1 - nu)). |alpha| <= 1, |beta| <= 1/2 for nu >= 0. Source: Dundurs (1969), J. Appl. Mech. 36,
-    650-652; Johnson (1985), section 5.1, has beta with the opposite sign. Raises InputError if both bodies are rigid.
+    With A = (1 - nu) / G and B = (1 - 2 nu) / (2 G) of the upper body (1) and the lower body (2) they are alpha = (A2
+    - A1) / (A2 + A1) and beta = (B2 - B1) / (A2 + A1). Both are zero for equal materials and positive where the upper
+    body is the stiffer. A rigid upper body has alpha = 1 and beta = (1 - 2 nu) / (2 (1 - nu)). |alpha| <= 1, and
+    |beta| <= 1/2 for nu >= 0. Source: Dundurs (1969), J. Appl. Mech. 36, 650-652. Johnson (1985), section 5.1, has
+    beta with the opposite sign.
+
+    Parameters
+    ----------
+    upper, lower
+        Materials; None is a rigid body.
+
+    Returns
+    -------
+    (float, float)
+        alpha and beta [-].
+
+    Raises
+    ------
+    InputError
+        If both bodies are rigid.
     """
     _elastic(upper, lower)
     compliance = [0.0 if m is None else 2 * (1 + m.nu) / m.E for m in (upper, lower)]

@@ -53,6 +53,9 @@ def run_campaign(
     if not runs:
         raise InputError("no run matches the filters.")
     e = experiment
+    if not quiet:
+        for sentence in dict.fromkeys(e.skipped):  # once for each reason
+            print(f"left out: {sentence}", file=sys.stderr)
     limits = (e.time_limit, e.memory_limit, e.max_iterations, e.seed, e.diagnose)
     with Store(folder, resume) as store:
         if experiment.path.is_file():

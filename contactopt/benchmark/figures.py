@@ -1,61 +1,63 @@
 """Figures of a report: f(table, ...) -> matplotlib Figure, from results alone; nothing is solved here.
 
-`table` is what contactopt.benchmark.load returns. A figure that compares times takes the runs of one law only. Colours
-are those of Okabe and Ito.
+`table` is what contactopt.benchmark.load returns. A figure that compares times takes the runs of one law only. Every figure
+takes `labels`, short names for long ones.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactopt.benchmark.style import (
+    FLOOR,
+    LEAST_RESIDUAL,
+    NAMES,
+    add_legend,
+    label_ends,
+    make_figure,
+    set_ticks,
+    short_label,
+    short_tick,
+    styles,
+    write_numbers,
+)
 from contactopt.benchmark.tables import INSTANCE, groups
 from contactopt.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
-MARKERS = "osD^vP*X"
-LEAST_RESIDUAL = 1e-17  # drawn in place of 0
-NAMES = {
-    "solve_seconds": "time of the method [s]",
-    "call_seconds": "time of the whole call [s]",
-    "cpu_seconds": "CPU time of the whole call [s]",
-    "peak_mb": "peak memory [MB]",
-    "iterations": "outer iterations",
-    "error": "relative error of the forces [-]",
-    "residual": "natural-map residual [-]",
-    "contacts": "contacts",
-    "problem.contacts": "contacts",
-    "problem.mu": "friction coefficient [-]",
-    "problem.stiffness_ratio": "E lower / E upper [-]",
-    "problem.elements": "elements across the half-width",
-    "method.rho": "penalty factor rho [-]",
-    "problem.coupling": "Dundurs' constant [-]",
-    "method.factor": "penalty factor [-]",
-    "problem.upper_nu": "Poisson's ratio, upper body [-]",
-}
 
-
-def speed_accuracy(table: pd.DataFrame, time: str = "solve_seconds", by: str = "method") -> Any:
+def speed_accuracy(
+    table: pd.DataFrame,
+    time: str = "solve_seconds",
+    by: str = "method",
+    labels: Mapping[str, str] = MappingProxyType({}),
+) -> Any:
     """Time against certified residual: per method a line through its settings, medians over problems and repeats.
 
     Filled: at least half of the runs kept the tolerance. The Pareto front, where nothing is both faster and more accurate,
-    is drawn in grey.
+    is drawn in grey. A residual below FLOOR of its tolerance is drawn at FLOOR. Labels stand where the lines end, too.
+
+    labels  name of a method -> the short label that it gets
     """
-    figure, ax = _figure()
-    points = []
-    for (name, rows), style in zip(groups(table, by), _styles()):
+    figure, ax = make_figure()
+    points, ends = [], []
+    for (name, rows), style in zip(groups(table, by), styles()):
+        name = short_label(name, labels)
         settings = rows.groupby("tolerance").agg(
             {time: "median", "residual": "median", "success": "mean"}
         )  # settings of the same tolerance are one point
         settings = settings.sort_index(ascending=False)
         shown = settings[np.isfinite(settings["residual"])]
-        x, y = shown[time].to_numpy(), np.maximum(shown["residual"].to_numpy(), LEAST_RESIDUAL)
+        floor = FLOOR * shown.index.to_numpy(float)
+        x, y = shown[time].to_numpy(), np.maximum(shown["residual"].to_numpy(), floor)
+        ends += [(x[-1], y[-1], name, style["color"])] if len(x) else []
         ax.loglog(x, y, "-", color=style["color"], lw=1, alpha=0.7)
         good = shown["success"].to_numpy() >= 0.5
         options = {"ls": "none", "marker": style["marker"], "color": style["color"], "ms": 6}
@@ -63,11 +65,12 @@ def speed_accuracy(table: pd.DataFrame, time: str = "solve_seconds", by: str = "
             ax.loglog(x[good], y[good], label=name, **options)
         ax.loglog(x[~good], y[~good], mfc="white", label="" if good.any() else name, **options)
         points += list(zip(x, y))
+    label_ends(ax, ends)
     front = _pareto(np.array(points))
     ax.step(front[:, 0], front[:, 1], where="post", color="#bbbbbb", lw=5, zorder=0, label="Pareto front")
     ax.set(xlabel=NAMES.get(time, time) + ", median", ylabel="natural-map residual [-], median")
-    _ticks(ax.xaxis)
-    return _legend(figure, ax)
+    set_ticks(ax.xaxis)
+    return add_legend(figure, ax)
 
 
 def _pareto(points: np.ndarray) -> np.ndarray:
@@ -79,12 +82,17 @@ def _pareto(points: np.ndarray) -> np.ndarray:
     return np.asarray(points[np.concatenate([[True], points[1:, 1] < best[:-1]])])
 
 
-def performance_profile(table: pd.DataFrame, metric: str = "solve_seconds", by: str = "method") -> Any:
+def performance_profile(
+    table: pd.DataFrame,
+    metric: str = "solve_seconds",
+    by: str = "method",
+    labels: Mapping[str, str] = MappingProxyType({}),
+) -> Any:
     """Dolan-More profile: share of the instances solved within a factor of the best method's time on each.
 
     An instance is a problem at a setting and start; medians over repeats, and a method that fails once has failed.
     """
-    figure, ax = _figure()
+    figure, ax = make_figure()
     times = table[metric].where(table["success"], np.inf)
     medians = (
         table.assign(_time=times)
@@ -95,8 +103,9 @@ def performance_profile(table: pd.DataFrame, metric: str = "solve_seconds", by: 
     solvable = wide[np.isfinite(wide.min(axis=1))]
     ratio = solvable.div(solvable.min(axis=1), axis=0)
     largest = 1.3 * max(2.0, float(np.nanmax(ratio.to_numpy()[np.isfinite(ratio.to_numpy())], initial=2.0)))
-    for (name, _), style in zip(groups(table, by), _styles()):
-        sorted_ratios = np.sort(ratio[name].dropna().to_numpy())
+    for (full, _), style in zip(groups(table, by), styles()):
+        name = short_label(full, labels)
+        sorted_ratios = np.sort(ratio[full].dropna().to_numpy())
         sorted_ratios = sorted_ratios[np.isfinite(sorted_ratios)]
         share = np.arange(1, len(sorted_ratios) + 1) / len(wide)
         x, y = (
@@ -104,27 +113,40 @@ def performance_profile(table: pd.DataFrame, metric: str = "solve_seconds", by: 
             np.concatenate([[0.0], share, share[-1:] if len(share) else [0.0]]),
         )
         ax.step(x, y, where="post", color=style["color"], ls=style["ls"], lw=1.6, label=f"{name} ({len(share)})")
+    what = NAMES.get(metric, metric).partition(" [")[0]
     ax.set(
-        xscale="log", xlim=(1, largest), ylim=(0, 1.03), xlabel=f"{NAMES.get(metric, metric)}, over that of the best"
+        xscale="log",
+        xlim=(1, largest),
+        ylim=(0, 1.03),
+        xlabel=f"ratio: {what} / that of the best method on the instance [-]",
     )
     ax.set_ylabel(f"share of the {len(wide)} instances solved")
-    return _legend(figure, ax, "method (solved)")
+    return add_legend(figure, ax, "method (solved)")
 
 
 def time_against_size(
-    table: pd.DataFrame, size: str = "contacts", metric: str = "solve_seconds", by: str = "method"
+    table: pd.DataFrame,
+    size: str = "contacts",
+    metric: str = "solve_seconds",
+    by: str = "method",
+    labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
     """Median time of successful runs against size, with the exponent p of time ~ size^p from the larger half of the sizes."""
-    figure, ax = _figure()
-    for (name, rows), style in zip(groups(table[table["success"]], by), _styles()):
+    figure, ax = make_figure()
+    ends = []
+    look = {name: style for (name, _), style in zip(groups(table, by), styles())}
+    for full, rows in groups(table[table["success"]], by):
+        name, style = short_label(full, labels), look[full]
         medians = rows.groupby(size)[metric].median()
         x, y = medians.index.to_numpy(float), medians.to_numpy()
         exponent = fitted_exponent(x, y)
+        ends.append((x[-1], y[-1], name, style["color"]))
         label = name + ("" if np.isnan(exponent) else f": {exponent:.1f}")
         ax.loglog(x, y, marker=style["marker"], color=style["color"], ls=style["ls"], ms=5, lw=1.2, label=label)
+    label_ends(ax, ends)
     ax.set(xlabel=NAMES.get(size, size), ylabel=NAMES.get(metric, metric) + ", median")
-    _ticks(ax.xaxis)
-    return _legend(figure, ax, "method: exponent")
+    set_ticks(ax.xaxis)
+    return add_legend(figure, ax, "method: exponent")
 
 
 def fitted_exponent(x: np.ndarray, y: np.ndarray) -> float:
@@ -142,7 +164,9 @@ def stability_map(
     value: str = "success",
     by: str = "method",
 ) -> Any:
-    """One panel per method: success, iterations, error or time over two parameters; grey where no run succeeded.
+    """One panel per method: success, iterations, error or time over two parameters; hatched grey where no run succeeded.
+
+    The cells hold their numbers, unless a map has more than CELLS of them.
 
     Runs that ended by the method's own criterion above the tolerance ("settled") show their value too.
 
@@ -153,7 +177,7 @@ def stability_map(
 
     parts = groups(table, by)
     columns = min(4, len(parts))
-    figure, axes = _figure(columns, -(-len(parts) // columns), size=(3.0, 2.9) if len(parts) > 1 else (6.4, 3.6))
+    figure, axes = make_figure(columns, -(-len(parts) // columns), size=(3.0, 2.9) if len(parts) > 1 else (6.4, 3.6))
     grids = [(name, rows, _grid(rows, x, y, value)) for name, rows in parts]
     shown = np.concatenate([grid.to_numpy(float).ravel() for _, _, grid in grids])
     shown = shown[np.isfinite(shown) & (shown > 0)]
@@ -161,13 +185,15 @@ def stability_map(
     norm = Normalize(0, 1) if value == "success" else LogNorm(low, high if high > low else 2 * low)
     for number, (ax, (name, rows, grid)) in enumerate(zip(np.ravel(axes), grids)):
         ax.set_facecolor("#cccccc")
+        ax.patch.set(hatch="xx", edgecolor="#999999")
+        write_numbers(ax, grid, norm)
         mesh = ax.imshow(grid.to_numpy(float), norm=norm, cmap="viridis", origin="lower", aspect="auto")
         ax.set_title(name, fontsize=9)
         ax.set_xlabel(NAMES.get(x, x), fontsize=8 if len(parts) > 1 else None)
         ax.set_ylabel(NAMES.get(y, y) if number % columns == 0 else "", fontsize=8 if len(parts) > 1 else None)
         for axis, index in ((ax.xaxis, grid.columns), (ax.yaxis, grid.index)):
             room = 26 if axis is ax.xaxis and len(parts) > 1 else 60  # characters
-            names = [_short(v) for v in index]
+            names = [short_tick(v) for v in index]
             ticks = range(0, len(index), -(-sum(len(name) + 1 for name in names) // room))
             axis.set_ticks(list(ticks), [names[i] for i in ticks], fontsize=8)
         _thresholds(ax, rows, x, y, grid)
@@ -179,12 +205,6 @@ def stability_map(
     label = "share of runs solved" if value == "success" else NAMES.get(value, value) + ", median"
     figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
     return figure
-
-
-def _short(value: float) -> str:
-    """100000.0 -> 1e5"""
-    plain, power = f"{value:g}", f"{value:.1e}".replace(".0e", "e").replace("e+0", "e").replace("e-0", "e-")
-    return power if len(power) < len(plain) and float(power) == value else plain
 
 
 def _grid(rows: pd.DataFrame, x: str, y: str, value: str) -> pd.DataFrame:
@@ -216,58 +236,27 @@ def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame)
             ax.plot(*(line if x == "problem.mu" else line[::-1]), style, color="#D55E00", lw=2, label=label)
 
 
-def convergence(table: pd.DataFrame, x: str = "iterations", by: str = "method") -> Any:
+def convergence(
+    table: pd.DataFrame,
+    x: str = "iterations",
+    by: str = "method",
+    labels: Mapping[str, str] = MappingProxyType({}),
+) -> Any:
     """Natural-map residual after each outer iteration, or against `x` = "seconds"; the first repeat of each method."""
     if x not in ("iterations", "seconds"):
         raise InputError("convergence histories are drawn against 'iterations' or 'seconds'.")
-    figure, ax = _figure()
-    for (name, rows), style in zip(groups(table, by), _styles()):
+    figure, ax = make_figure()
+    for (name, rows), style in zip(groups(table, by), styles()):
         history = json.loads(rows.sort_values("repeat")["history"].iloc[0])
         if not history:
             continue
         residual, seconds, iterations = history
         along = iterations if x == "iterations" else seconds
-        residual = np.maximum(residual, LEAST_RESIDUAL)
+        residual = np.maximum(residual, max(LEAST_RESIDUAL, FLOOR * float(rows["tolerance"].min())))
+        name = short_label(name, labels)
         ax.loglog(along, residual, marker=style["marker"], ms=3, lw=1, color=style["color"], ls=style["ls"], label=name)
     ax.set(xlabel="outer iteration" if x == "iterations" else "seconds", ylabel="natural-map residual [-]")
-    return _legend(figure, ax)
-
-
-def _styles() -> list[dict[str, Any]]:
-    lines = ("-", "--", ":")
-    return [
-        {"color": c, "marker": MARKERS[(i + 3 * n) % len(MARKERS)], "ls": line}
-        for n, line in enumerate(lines)
-        for i, c in enumerate(COLOURS)
-    ]
-
-
-def _figure(columns: int = 1, rows: int = 1, size: Sequence[float] = (7.6, 4.4)) -> tuple[Any, Any]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
-    return figure, figure.subplots(rows, columns)
-
-
-def _ticks(axis: Any) -> None:
-    """At 1, 2, 5 on a logarithmic axis of less than two decades, where the usual labels run into each other."""
-    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
-
-    low, high = axis.get_view_interval()
-    if high < 100 * low:
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axis.set_major_formatter(FormatStrFormatter("%g"))
-    axis.set_minor_formatter(NullFormatter())
-
-
-def _legend(figure: Any, ax: Any, title: str | None = None) -> Any:
-    ax.grid(alpha=0.3)
-    handles, labels = ax.get_legend_handles_labels()
-    if handles:
-        figure.legend(
-            handles, labels, loc="outside right upper", frameon=False, fontsize=8, title=title, title_fontsize=8
-        )
-    return figure
+    return add_legend(figure, ax)
 
 
 FIGURES: dict[str, Callable[..., Any]] = {

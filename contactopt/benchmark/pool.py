@@ -21,6 +21,7 @@ from contactopt.problem import InterfaceProblem
 
 START_LIMIT = 120.0  # s until a process answers at all
 BUILD_LIMIT = 1800.0  # s to build a problem
+STARTS = 3  # of a process that is killed before it says a word: once may be chance, each time is its limit of memory
 WARM_UP_LIMIT = 30.0  # s to import what a method needs, beyond its time limit
 MARGIN, GRACE = 1.1, 0.5  # the hard limit is MARGIN * time_limit + GRACE: methods may end by themselves first
 ROOM = 1e6  # bytes of a message beyond the arrays that it must hold
@@ -140,8 +141,8 @@ class Worker:
         self.held = Built(spec.label, problem, facts)
         return self.held
 
-    def _answer(self, task: Task, built: Built) -> Answer:
-        """What the method answers. Raises Ended if its process did not outlive it."""
+    def _answer(self, task: Task, built: Built, starts: int = 1) -> Answer:
+        """What the method answers, at the first start of a process or a later one. Raises Ended if it did not outlive it."""
         method = task.run.method.label
         if self.doubted not in ("", method):
             self._restart()
@@ -167,9 +168,11 @@ class Worker:
                 raise
             if used:  # an earlier run left the process in disorder
                 return self._answer(task, built)
+            if end.status != "error" and starts < STARTS:
+                return self._answer(task, built, starts + 1)
             if end.status != "error":
                 raise InputError(
-                    f"a worker process cannot start ({end.status}, {end.message}); is memory_limit, "
+                    f"a worker process cannot start after {starts} trials ({end.status}, {end.message}); is memory_limit, "
                     f"{task.memory_limit:g} GB, enough?"
                 ) from end
             raise

@@ -7,8 +7,10 @@ An experiment file lists its figures and tables in order, each with a caption, a
     kind = "speed_accuracy"                     # a function of contactopt.benchmark.figures or .tables
     caption = "Time against accuracy."
     where = {"problem.elements" = 16}           # law = "coulomb" unless given
+    optional = true                             # left out where no row fits, as in a quick version
+    time = "cpu_seconds"                        # all other keys are arguments of that function
 
-Its report is REPORTS/NAME/report.md, its table REPORTS/NAME/rows.csv; all reports together are REPORTS/benchmarks.html.
+A file without figures gets the usual ones (USUAL). Its report is REPORTS/NAME/report.md, its table REPORTS/NAME/rows.csv; all reports together are REPORTS/benchmarks.html.
 """
 
 from __future__ import annotations
@@ -36,6 +38,26 @@ from contactopt.files import remove_files, replace_file
 if TYPE_CHECKING:
     import pandas as pd
 
+# The report of an experiment that asks for no figures.
+USUAL = (
+    {"kind": "success_table", "caption": "Runs that kept the tolerance, by setting; how the others ended."},
+    {
+        "kind": "performance_profile",
+        "caption": "Which share of the instances each method solved, and how fast.",
+        "metric": "cpu_seconds",
+    },
+    {
+        "kind": "speed_accuracy",
+        "caption": "CPU time against certified residual; hollow: the tolerance was missed.",
+        "time": "cpu_seconds",
+    },
+    {
+        "kind": "time_table",
+        "caption": "Shifted geometric means; a failure counts at the time limit.",
+        "metric": "cpu_seconds",
+    },
+)
+OWN_KEYS = ("kind", "caption", "where", "optional")  # of a figure; all others are arguments of its function
 LEFT_OUT = ("key", "label", "base_mb", "history")  # of a report's table
 PAGE = "benchmarks.html"
 DPI, SHADES = 90, 256
@@ -120,7 +142,8 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
             folder = subfolder(reports, layout.name)
             if (folder / "rows.csv").exists():
                 with told(folder):
-                    bodies.append((layout, folder, _write_report(layout, folder)))
+                    text = write_report(layout, folder, load(folder / "rows.csv"))
+                bodies.append((layout, folder, text))
         except InputError as error:
             errors.append(str(error))
     if bodies:
@@ -135,14 +158,16 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
     return reports / PAGE
 
 
-def _write_report(layout: Layout, folder: Path) -> str:
-    table = load(folder / "rows.csv")
+def write_report(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
+    """Write report.md with its pictures into a folder; returns its Markdown. InputError if a figure does not fit the table."""
     parts = [f"# {one_line(layout.title)}", inert(layout.text.strip())]
     if layout.findings:
         parts.append("\n".join(f"{n}. {inert(text)}" for n, text in enumerate(_findings(layout, table), 1)))
     remove_files(folder, [old.name for old in folder.glob("figure-*.png")])
-    for number, entry in enumerate(layout.figures, 1):
+    for number, entry in enumerate(layout.figures or USUAL, 1):
         result = _drawn(layout, number, entry, table)
+        if result is None:
+            continue
         if entry["kind"] in TABLES:
             parts += [markdown(result), f"*Table {number}. {one_line(entry['caption'])}*"]
         else:
@@ -157,10 +182,16 @@ def _write_report(layout: Layout, folder: Path) -> str:
 
 
 def _drawn(layout: Layout, number: int, entry: Mapping[str, Any], table: pd.DataFrame) -> Any:
-    arguments = {key: value for key, value in entry.items() if key not in ("kind", "caption", "where")}
+    """What a figure's function makes of its rows; None where no row fits an optional one."""
+    arguments = {key: value for key, value in entry.items() if key not in OWN_KEYS}
     where = dict(entry.get("where", {}))
     try:
         rows = select(table, where.pop("law", "coulomb"), **where)
+    except InputError as error:
+        if entry.get("optional"):
+            return None
+        raise InputError(f"'{layout.path}', figure {number} ({entry['kind']}): {error}") from error
+    try:
         return (
             TABLES[entry["kind"]](rows, **arguments)
             if entry["kind"] in TABLES
@@ -194,13 +225,18 @@ def _foot(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
     failures = int((~table["success"]).sum())
     backends = sorted({name for text in table["backend"] for name in str(text).split(", ")} - {"native", "nan"})
     link = Path(os.path.relpath(layout.path, folder)).as_posix()
+    kept = (folder / "rows.csv").exists()  # a report of the project, not the folder of a campaign
+    name = "rows.csv" if kept else "rows.parquet"
+    again = f"`contactopt report --run full {layout.path.stem}`; rebuilt from the table by `contactopt report`"
     lines = [
         f"{len(table)} runs, of which {failures} did not keep their tolerance. Every success is a certificate recomputed from "
         "the problem.",
         f"Wall over CPU time of the calls: median {(table['call_seconds'] / table['cpu_seconds']).median():.1f} (more than 1: a busy "
         "machine; CPU times are compared, time limits are wall).",
-        f"Experiment: [`{layout.path.name}`]({link}); table: [`rows.csv`](rows.csv).",
-        f"Made by `contactopt report --run full {layout.path.stem}`; rebuilt from the table by `contactopt report`.",
+        f"Experiment: [`{layout.path.name}`]({link}); table: [`{name}`]({name}).",
+        f"Made by {again}."
+        if kept
+        else "Made by `contactopt bench`; rebuilt from the table by `contactopt report` with this folder.",
         one_line(
             f"Environment: {'; '.join(sorted(set(table['machine'])))}. {'; '.join(sorted(set(table['versions'])))}. One BLAS thread."
         ),

@@ -18,9 +18,9 @@ from skfem.helpers import dot
 
 from contactopt.bodies.elements import SHAPES, Trace, contact_trace, make_basis, node_unknowns, straight, weight_at
 from contactopt.bodies.motions import Motions, check_free, free_motions
-from contactopt.bodies.stiffness import stiffness
+from contactopt.bodies.stiffness import isotropic_stiffness, stiffness
 from contactopt.errors import InputError
-from contactopt.material import Material
+from contactopt.material import Material, lame_by_poisson
 from contactopt.scenes.scene import Part, Plate, Scene, Traction
 
 
@@ -89,6 +89,15 @@ class Assembly:
     def unknowns(self) -> np.ndarray:
         """Displacement unknowns of every node, (dim, n / dim); the vertices of the mesh come first."""
         return node_unknowns(self.basis)
+
+    @cached_property
+    def by_poisson(self) -> sp.csr_matrix:
+        """(n, n) derivative of the stiffness A by Poisson's ratio."""
+        return isotropic_stiffness(self.basis, lame_by_poisson(self.material), self.weight)
+
+    def stiffness_change(self, constant: str, U: np.ndarray) -> np.ndarray:
+        """dA U (n,), the derivative of the elastic forces by the material's constant 'E' or 'nu' at fixed displacements U."""
+        return np.asarray(self.A @ U / self.material.E if constant == "E" else self.by_poisson @ U)
 
     @property
     def locations(self) -> np.ndarray:
@@ -173,12 +182,15 @@ def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
     known = mesh.boundaries or {}
     names = [*scene.surfaces_of(part), *(s.boundary for s in part.supports)]
     names += [load.boundary for load in part.loads if isinstance(load, (Traction, Plate))]
+    filled = sorted(boundary for boundary, facets in known.items() if len(facets))
     for name in names:
-        if name not in known or len(known[name]) == 0:
-            raise InputError(
-                f"body '{part.name}': the mesh has no boundary named {name!r} (or it is empty); "
-                f"it has {', '.join(sorted(known)) or 'none'}."
+        if name not in filled:
+            wrong = (
+                f"boundary {name!r} has no facets in this mesh"
+                if name in known
+                else f"the mesh has no boundary named {name!r}"
             )
+            raise InputError(f"body '{part.name}': {wrong}; it has {', '.join(filled) or 'none'}.")
 
 
 def _load(part: Part, basis: skfem.CellBasis, weight: tuple[float, bool]) -> np.ndarray:

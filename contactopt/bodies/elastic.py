@@ -26,7 +26,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.body import Assembly, build_body, reload_body
 from contactopt.bodies.elements import face_nodes
-from contactopt.bodies.fields import Fields, fields_of
+from contactopt.bodies.fields import Fields, fields_of, recovery_error
 from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import BodySolver, System
@@ -157,6 +157,26 @@ class ElasticBody:
         U[self.kept] = self.solver.solve(force[self.kept])
         return np.asarray(U - Z @ (self.relief.T @ force) - self.relief @ (Z.T @ force))
 
+    def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        missing = -self.body.stiffness_change(constant, U)  # acts like a load
+        return self.elastic_modes @ (self.elastic_modes.T @ missing) + self.relieved(missing), self.motions.T @ missing
+
+    def material_work(self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray) -> float:
+        return -float(W @ self.body.stiffness_change(constant, U))
+
+    def load_work(self, scene: Scene, part: Part, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
+        old, new = self.body, reload_body(self.body, scene, part)
+        lift, plates = new.prescribed - old.prescribed, self.modes[0].shape[1]
+        driven = self.modes[1] @ (self.elastic_modes.T @ dual) + self.modes[0] @ weights[:plates]
+        loads = new.load - old.load - old.A @ lift
+        return float(dual @ lift + W @ loads + driven @ (new.plate_forces - old.plate_forces))
+
+    def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.body.A @ U, np.zeros(len(U))
+
+    def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
+        return float(U @ self.body.stiffness_change(constant, U)) / 2
+
     def energy(self, U: np.ndarray) -> float:
         return float(U @ (self.body.A @ U)) / 2
 
@@ -179,6 +199,9 @@ class ElasticBody:
 
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
+
+    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+        return recovery_error(self.body, U, W)
 
     def loaded(self, scene: Scene, part: Part) -> ElasticBody:
         return _at_rest(self, reload_body(self.body, scene, part))
@@ -209,11 +232,20 @@ class AssembledElastic:
 
     def surface(self, name: str | None = None) -> Surface:
         """The contact surface, with the places of its nodes on the curve that the part gives."""
-        name, body = name or self.part.contact, self.body
-        if name not in body.traces:
+        name = name or self.part.contact
+        if name not in self.body.traces:
             raise InputError(
-                f"body '{self.name}' has no contact surface {name!r}; it has {', '.join(sorted(body.traces))}."
+                f"body '{self.name}' has no contact surface {name!r}; it has {', '.join(sorted(self.body.traces))}."
             )
+        return self._surfaces[name]
+
+    @cached_property
+    def _surfaces(self) -> dict[str, Surface]:
+        """All of them, made once: a surface may take part in several pairs."""
+        return {name: self._surface(name) for name in self.body.traces}
+
+    def _surface(self, name: str) -> Surface:
+        body = self.body
         trace, unknowns = body.traces[name], body.unknowns
         nodes = np.unique(trace.weights.indices)
         places = body.locations[:, nodes]

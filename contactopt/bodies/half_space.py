@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
 from contactopt.bodies.protocol import Surface
 from contactopt.errors import InputError
-from contactopt.material import lame
+from contactopt.material import Material, lame
 from contactopt.problem.chart import Chart
 from contactopt.problem.convolution import Convolution, Kernel, embedding
 from contactopt.problem.operators import Product
@@ -193,6 +193,37 @@ class HalfSpaceBody:
 
     def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         return np.asarray(self.at_rest + self.motions @ multipliers + self._compliance_product(force))
+
+    def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The compliance is a polynomial of second degree in nu over E: central differences by nu are exact."""
+        E, nu = self.part.material.E, self.part.material.nu
+        change = np.zeros(len(U))
+        if constant == "E":
+            change[: self.unknowns] = -self._compliance_product(force)[: self.unknowns] / E
+            return change, np.zeros(len(self.resultants))
+        h = min(0.1, (0.5 - nu) / 2, (1 + nu) / 2)
+        for sign in (1.0, -1.0):
+            other = replace(self, part=replace(self.part, material=Material(E, nu + sign * h)))
+            change[: self.unknowns] += sign * other._compliance_product(force)[: self.unknowns] / (2 * h)
+        return change, np.zeros(len(self.resultants))
+
+    def material_work(self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray) -> float:
+        return float(dual @ self.material_change(constant, U, force)[0])
+
+    def load_work(self, scene: Scene, part: HalfSpace, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
+        new = self.loaded(scene, part)
+        return float(dual @ (new.at_rest - self.at_rest) + weights @ (new.resultants - self.resultants))
+
+    def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        by_force = self._compliance_product(force)
+        by_force[self.unknowns :] = 0.0
+        return np.zeros(len(U)), by_force
+
+    def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
+        return float(force @ self.material_change(constant, U, force)[0]) / 2
+
+    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+        return np.zeros(0)
 
     def energy(self, U: np.ndarray) -> float:
         force = U[self.unknowns : 2 * self.unknowns]

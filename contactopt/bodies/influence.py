@@ -27,7 +27,8 @@ import numpy as np
 
 from contactopt.material import Material, lame
 
-# Number of cells from the loaded one from which on Gauss's rule with that many points a side is used, farthest last.
+# Number of the longer sides of a cell from the loaded one from which on Gauss's rule with that many points a side is used,
+# farthest last.
 GAUSS = ((12, 8), (64, 3))
 
 Antiderivative = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -136,13 +137,17 @@ WHOLE: dict[str, Antiderivative] = {
 
 def _means(spacing: tuple[float, float], offsets: tuple[np.ndarray, np.ndarray]) -> dict[str, np.ndarray]:
     """Means of x^2/rho^3, y^2/rho^3, x y/rho^3, x/rho^2 and y/rho^2 over the cell at each offset (i, j)."""
-    farthest = GAUSS[-1][1]
+    farthest, longer = GAUSS[-1][1], max(spacing)
+
+    def within(reach: int) -> list[np.ndarray]:
+        return [np.flatnonzero(h * np.abs(along) <= reach * longer) for h, along in zip(spacing, offsets)]
+
     out = _by_gauss(spacing, offsets, farthest)
     for reach, points in [*((GAUSS[n + 1][0], GAUSS[n][1]) for n in range(len(GAUSS) - 1))][::-1]:
-        some = [np.flatnonzero(np.abs(along) <= reach) for along in offsets]
+        some = within(reach)
         for name, value in _by_gauss(spacing, (offsets[0][some[0]], offsets[1][some[1]]), points).items():
             out[name][np.ix_(*some)] = value
-    some = [np.flatnonzero(np.abs(along) <= GAUSS[0][0]) for along in offsets]
+    some = within(GAUSS[0][0])
     (hx, hy), corners = spacing, [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]
     x, y = np.meshgrid(hx * offsets[0][some[0]], hy * offsets[1][some[1]], indexing="ij")
     for name, whole in WHOLE.items():

@@ -219,6 +219,30 @@ class Body(Protocol):
     def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """U (n,) under contact forces (n,) and multipliers (p,)."""
 
+    def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of U (n,) and of the balance of the free motions (p,) by the material's constant 'E' or 'nu'.
+
+        The contact forces `force` (n,) and the multipliers stay as they are.
+        """
+
+    def material_work(self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray) -> float:
+        """The product of `material_change` with `dual` (n,) and with the weights of the balance, without a solve.
+
+        W (n,) is the displacement under the forces `dual` and these weights as multipliers, without loads.
+        """
+
+    def load_work(self, scene: Any, part: Any, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
+        """The product of dual (n,) and weights (p,) with what the loads of `part` change in at_rest and resultants, without a solve.
+
+        W as in `material_work`.
+        """
+
+    def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the elastic energy by U (n,) and, as far as it is no function of U, by the forces (n,)."""
+
+    def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
+        """Derivative of the elastic energy by the material's constant 'E' or 'nu' at fixed U and forces."""
+
     def energy(self, U: np.ndarray) -> float:
         """Elastic energy at the displacement U (n,) [force length]."""
 
@@ -230,6 +254,9 @@ class Body(Protocol):
 
         U (n,) is the displacement under the contact forces `force` (n,).
         """
+
+    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+        """For each element the product of the stress errors of U and W (contactopt.bodies.fields); (0,) without elements."""
 
     def fields(self, U: np.ndarray) -> Fields | None:
         """Displacement and stress at the displacement U (n,); None for a body without any."""

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from contactopt.bodies.elements import is_curved
 from contactopt.errors import InputError
@@ -19,6 +18,8 @@ def split(mesh: Any, *contacts: str) -> Any:
     The spline gives the height over the coordinate along which the boundary extends most, so that partners on
     two bodies stay partners. Raises InputError for meshes of solids (scikit-fem drops their boundaries) or of curved elements.
     """
+    from scipy.interpolate import CubicSpline
+
     if is_curved(mesh) or len(mesh.p) > 2:
         raise InputError(
             "a given mesh can be refined only if it is plane with straight elements; give the part a function "

@@ -7,6 +7,7 @@ forces that hold the body are known from U.
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,9 @@ from contactopt.bodies.protocol import Surface
 from contactopt.errors import InputError
 from contactopt.problem.operators import Product
 from contactopt.scenes.scene import Rigid, Scene
+
+log = logging.getLogger(__name__)
+FLAT = 1e-3  # normals of a surface that differ by less than this are one direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +69,13 @@ class RigidBody:
         if self.part.normal is not None:
             own = np.array(self.part.normal, dtype=float)
             normals = np.tile(own[:, None] / np.linalg.norm(own), k)
+        elif self.part.gap is not None and np.ptp(normals, axis=1).max(initial=0.0) > FLAT:
+            log.warning(
+                "the gap of rigid body '%s' is taken along the normals of the curved surface of body '%s', because no normal is "
+                "given; give Rigid(normal=...) if the gap is measured along one direction.",
+                self.name,
+                other.body,
+            )
         fixed = np.array([name not in self._force for name in self.components])
         trace = [sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, 2 * dim)) for c in range(dim)]
         held = np.tile(fixed[:, None], k)
@@ -103,6 +114,25 @@ class RigidBody:
 
     def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         return np.asarray(self.at_rest + self.motions @ multipliers + np.roll(force, len(self.components)))
+
+    def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(len(U)), np.zeros(len(self.resultants))
+
+    def material_work(self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray) -> float:
+        return 0.0
+
+    def load_work(self, scene: Scene, part: Rigid, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
+        new = self.loaded(scene, part)
+        return float(dual @ (new.at_rest - self.at_rest) + weights @ (new.resultants - self.resultants))
+
+    def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(len(U)), np.zeros(len(U))
+
+    def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
+        return 0.0
+
+    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+        return np.zeros(0)
 
     def energy(self, U: np.ndarray) -> float:
         return 0.0

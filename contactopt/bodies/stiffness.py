@@ -15,15 +15,22 @@ PIECE = 2**20  # entries of element matrices that are held at the same time
 
 
 def stiffness(basis: skfem.CellBasis, material: Material, weight: tuple[float, bool]) -> sp.csr_matrix:
+    """Elastic stiffness of a material, as isotropic_stiffness() of its Lame parameters."""
+    return isotropic_stiffness(basis, lame(material), weight)
+
+
+def isotropic_stiffness(
+    basis: skfem.CellBasis, constants: tuple[float, float], weight: tuple[float, bool]
+) -> sp.csr_matrix:
     """Elastic stiffness: the integral of sigma(u) : epsilon(v), with the hoop strain u_r / r if axisymmetric.
 
-    The pattern of the matrix is made first, from the nodes of the elements. The element matrices are then added to it
+    It is linear in Lame's parameters, so that their derivatives give the derivative of the stiffness. The pattern of the matrix is made first, from the nodes of the elements. The element matrices are then added to it
     a piece of the mesh at a time, so that little more memory is taken than the matrix needs.
 
     Parameters
     ----------
     basis : vector-valued displacement, the components of a node numbered one after the other
-    material : elastic constants [stress]
+    constants : Lame's lambda and G [stress]
     weight : measure of the integrals, see contactopt.bodies.elements.weight_at
 
     Returns
@@ -42,20 +49,20 @@ def stiffness(basis: skfem.CellBasis, material: Material, weight: tuple[float, b
     for piece in _pieces(len(nodes), dim * nodes.shape[1]):
         own = nodes[piece].astype(np.int64)
         pair = np.searchsorted(known, own[:, :, None] * graph.shape[0] + own[:, None, :])[:, :, None, :, None]
-        K = _element_matrices(basis, piece, material, weight)  # (element, i, a, j, b)
+        K = _element_matrices(basis, piece, constants, weight)  # (element, i, a, j, b)
         np.add.at(data, (first[pair] + a * step[pair] + b).ravel(), K.ravel())
     return sp.csr_matrix((data, indices, indptr), (basis.N, basis.N))
 
 
 def _element_matrices(
-    basis: skfem.CellBasis, elements: np.ndarray, material: Material, weight: tuple[float, bool]
+    basis: skfem.CellBasis, elements: np.ndarray, constants: tuple[float, float], weight: tuple[float, bool]
 ) -> np.ndarray:
     """Stiffness of some elements, (element, i, a, j, b) for component a of node i and component b of node j.
 
     With g_ia the derivative of shape function i along a, the entry is the integral of
     lambda g_ia g_jb + G g_ib g_ja + G (g_i . g_j) delta_ab: one batched matrix product for all elements.
     """
-    lam, shear = lame(material)
+    lam, shear = constants
     mapping, places, shape = basis.mapping, basis.X, basis.elem.elem
     fields = [shape.gbasis(mapping, places, i, tind=elements)[0] for i in range(basis.Nbfun // len(basis.mesh.p))]
     x = mapping.F(places, tind=elements)

@@ -17,7 +17,8 @@ from contactopt.bodies.half_space import HalfSpaceBody
 from contactopt.checks import check_number
 from contactopt.errors import InputError
 
-NEAR, FINE, COARSE = 4, 12, 3  # cells within which the finer of two Gauss rules is used, and the points of both
+# Distance in longer sides of a cell within which the finer of two Gauss rules is used, and the points of both.
+NEAR, FINE, COARSE = 8, 12, 3
 PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}
 
 
@@ -74,15 +75,13 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
 def _coefficients(body: HalfSpaceBody, padded: tuple[int, ...], depth: float) -> np.ndarray:
     """(stress component, loaded component, *padded) stress per unit of force, at the distances of a circulant."""
     offsets = [np.fft.fftfreq(m, 1 / m) for m in padded]
-    out = _mean(body, offsets, depth, COARSE)
-    near = [np.flatnonzero(np.abs(row) <= max(NEAR, 4 * depth / h)) for row, h in zip(offsets, body.spacing)]
+    out, longer = _mean(body, offsets, depth, COARSE), max(body.spacing)
+    if depth >= NEAR * longer:
+        return out
+    near = [np.flatnonzero(h * np.abs(row) <= NEAR * longer) for row, h in zip(offsets, body.spacing)]
     there: Any = (slice(None), slice(None), *np.ix_(*near))
-    out[there] = _mean(
-        body,
-        [row[some] for row, some in zip(offsets, near)],
-        depth,
-        FINE if depth < 2 * max(body.spacing) else 2 * COARSE,
-    )
+    points = FINE if depth < 2 * longer else 2 * COARSE
+    out[there] = _mean(body, [row[some] for row, some in zip(offsets, near)], depth, points)
     return out
 
 

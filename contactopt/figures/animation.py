@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.paths import PathResult
-from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE, contact_line
+from contactopt.figures.plots import contact_line, contact_place
+from contactopt.figures.style import BLUE, GREEN, GREY, ORANGE, make_axes
 from contactopt.files import whole_file
 
 FRAMES = 10  # per second
@@ -16,7 +17,7 @@ FRAMES = 10  # per second
 
 def loop(path: PathResult, ax: Any = None) -> Any:
     """Shear force against shift where the path has a shear, else normal force against approach."""
-    ax = _axes(ax)
+    ax = make_axes(ax)
     x, y, labels = _loop(path)
     ax.plot(x, y, "o-", color=BLUE, ms=3, lw=1)
     ax.plot(x[:1], y[:1], "o", color=GREEN, label="first state")
@@ -28,7 +29,7 @@ def loop(path: PathResult, ax: Any = None) -> Any:
 
 def energies(path: PathResult, ax: Any = None) -> Any:
     """Work since the first state: what did not become elastic energy, friction work, error of the steps."""
-    ax = _axes(ax)
+    ax = make_axes(ax)
     since = {key: value - value[0] for key, value in path.history.items()}
     state = np.arange(1, len(path.states) + 1)
     lost = since["external_work"] - since["elastic_energy"]
@@ -65,7 +66,7 @@ def animate(path: PathResult, file: str | Path) -> None:
     left, right = figure.subplots(1, 2)
     problem, scene = path.reduction.problem, path.states[-1].scene
     line = contact_line(problem)
-    x, area = problem.chart.places[0, line], problem.areas[line]
+    x, area = contact_place(problem)[line], problem.areas[line]
     bound = [problem.mu[line] * np.abs(s.solution.reactions[line, 0]) / area for s in path.states]
     shear = [-s.solution.reactions[line, 1] / area for s in path.states]
     peak = float(np.max(bound))
@@ -112,11 +113,3 @@ def _units(path: PathResult) -> tuple[str, str]:
     length, stress = path.states[0].scene.units
     newton = (length, stress) in (("mm", "MPa"), ("m", "Pa"))
     return "N" if newton else f"{stress} {length}$^2$", length
-
-
-def _axes(ax: Any) -> Any:
-    if ax is not None:
-        return ax
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(6.4, 4.8), layout="constrained").add_subplot()

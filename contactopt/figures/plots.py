@@ -1,195 +1,123 @@
-"""Every figure: f(data, ax=None) -> ax. Draws, never solves. Colours are those of Okabe and Ito, legible to all."""
+"""Every figure of a solved scene: f(data, ax=None) -> ax. Draws, never solves.
+
+A contact line is drawn over the arc length from its centre. A contact surface in 3D is drawn along the row of contacts through
+its centre where its nodes lie in rows, and as a coloured map where they do not.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from contactopt.analysis.edges import contact_area, contact_edge
 from contactopt.analysis.status import contact_status
-from contactopt.interface.recovery import Fields
+from contactopt.derivatives.design import Design
+from contactopt.derivatives.fit import Fit
+from contactopt.figures.bodies import deformed, magnification, mirror_plane
+from contactopt.figures.style import ARROWS, BLUE, GREEN, GREY, ORANGE, make_axes, singular
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.scenes.scene import Scene
 
-ARROWS = 1000  # about as many arrows as a map of tractions can show
-BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#666666"
-
-
-def _axes(ax: Any, **options: Any) -> Any:
-    if ax is not None:
-        return ax
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(6.4, 4.8), layout="constrained").add_subplot(**options)
-
-
-def magnification(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields]) -> float:
-    """Factor by which displacements are drawn: a round number, 1 where bodies are apart at first."""
-    displacement = max(float(np.abs(f.displacement).max()) for f in fields)
-    if displacement == 0 or np.ptp(problem.q[:, 0]) > 1e-3 * displacement:
-        return 1.0
-    size = _reach(scene, fields) or max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
-    target = 0.08 * size / displacement
-    if not 1.0 < target < np.inf:  # also where displacements are beyond all numbers
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(target))
-    return float(max(1.0, power * max(m for m in (1, 2, 5) if m * power <= target)))
-
-
-def deformed(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], ax: Any = None) -> Any:
-    """Deformed bodies coloured by von Mises stress, mirrored to the whole section (paper, figures 1 and 2)."""
-    scale = magnification(scene, problem, fields)
-    top = float(np.quantile(np.concatenate([f.von_mises for f in fields]), 0.998)) or 1.0
-    if scene.dim == 3:
-        ax = _draw_solid(scene, fields, scale, top, ax)
-    else:
-        ax = _draw_section(scene, fields, scale, top, ax, mirror_plane(scene, problem))
-    times = f", displacements x {scale:g}" if scale != 1 else ""
-    ax.set_title(f"{scene.name}: deformed bodies, {scene.friction}{times}")
-    return ax
-
-
-def mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] | None:
-    """Coordinate axis of a plane section and place on it beyond which the bodies are mirrored; None: they are whole.
-
-    It is the axis of revolution, or the plane of symmetry of a half model: that cuts the contact line at the origin of
-    its chart, across the line.
-    """
-    if scene.kind == "axisymmetric":
-        return 0, 0.0
-    chart, x = problem.chart, problem.coordinates
-    if scene.copies != 2 or not chart.mirrored[0] or len(x) != 2:
-        return None
-    nearest = np.argsort(np.abs(chart.places[0]))[:2]
-    axis = int(np.argmax(np.abs(np.diff(x[:, nearest], axis=1))))
-    return axis, float(x[axis, nearest[0]])
-
-
-def _draw_section(
-    scene: Scene, fields: Sequence[Fields], scale: float, top: float, ax: Any, plane: tuple[int, float] | None
-) -> Any:
-    ax = _axes(ax)
-    axis, place = plane or (0, 0.0)
-    for f in fields:
-        points = f.mesh.p + scale * f.displacement
-        corners = f.mesh.t.T
-        cells = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]) if corners.shape[1] == 4 else corners
-        outline = f.mesh.facets[:, f.mesh.boundary_facets()]
-        if plane is not None:  # the plane of symmetry is no edge of the whole body
-            outline = outline[:, ~np.all(np.isclose(f.mesh.p[axis][outline], place), axis=0)]
-        for image in (False, True) if plane is not None else (False,):
-            x = points.copy()
-            x[axis] = 2 * place - x[axis] if image else x[axis]
-            colours = ax.tripcolor(*x, cells, f.von_mises, shading="gouraud", cmap="viridis", vmin=0, vmax=top)
-            ax.plot(x[0][outline], x[1][outline], color="black", lw=0.6)
-    across, up = scene.components
-    ax.set(xlabel=f"{across} [{scene.units[0]}]", ylabel=f"{up} [{scene.units[0]}]", aspect="equal")
-    reach = _reach(scene, fields)
-    if reach is not None:
-        ax.set(xlim=(-reach, reach), ylim=(-0.9 * reach, 0.6 * reach))
-    ax.figure.colorbar(colours, ax=ax, label=f"von Mises stress [{scene.units[1]}]", extend="max", shrink=0.8)
-    return ax
-
-
-def _reach(scene: Scene, fields: Sequence[Fields]) -> float | None:
-    """How far from the centre to look at a small contact on large bodies; None: show the whole bodies."""
-    half_width = scene.reference.half_width if scene.reference else scene.zone
-    large = half_width is not None and max(np.ptp(f.mesh.p[0]) for f in fields) > 16 * half_width
-    return 4 * half_width if half_width is not None and large and scene.dim == 2 else None
-
-
-def _singular(scene: Scene) -> bool:
-    """Whether tractions are known to be infinite somewhere, so that the largest nodal value means nothing."""
-    return scene.reference is not None and scene.reference.peak is None
-
-
-def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float, ax: Any) -> Any:
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
-
-    ax = _axes(ax, projection="3d")
-    shade = ScalarMappable(Normalize(0, top), "viridis")
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for f in fields:
-        points = (f.mesh.p + scale * f.displacement).T
-        facets = f.mesh.facets[:, f.mesh.boundary_facets()].T
-        facets = _in_cycle(facets, points)
-        colours = shade.to_rgba(f.von_mises[facets].mean(axis=1))
-        ax.add_collection3d(
-            Poly3DCollection(points[facets], facecolors=colours, edgecolors=(0, 0, 0, 0.15), linewidths=0.2)
-        )
-        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_box_aspect(high - low)
-    ax.view_init(elev=22, azim=-130)
-    ax.set(xlabel=f"x [{scene.units[0]}]", ylabel=f"y [{scene.units[0]}]", zlabel=f"z [{scene.units[0]}]")
-    ax.figure.colorbar(shade, ax=ax, label=f"von Mises stress [{scene.units[1]}]", extend="max", shrink=0.7, pad=0.12)
-    return ax
-
-
-def _in_cycle(facets: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Corners of quadrilateral facets in the order of their perimeter: the farthest from the first comes third."""
-    if facets.shape[1] != 4:
-        return facets
-    centre = points[facets].mean(axis=1, keepdims=True)
-    arms = points[facets] - centre
-    first, second = arms[:, 0], arms[:, 1]
-    normal = np.cross(first, second)
-    normal[np.linalg.norm(normal, axis=1) == 0] = 1.0
-    side = np.cross(normal, first)
-    angle = np.arctan2(
-        np.einsum("fic,fc->fi", arms, side) / np.linalg.norm(side, axis=1)[:, None],
-        np.einsum("fic,fc->fi", arms, first) / np.linalg.norm(first, axis=1)[:, None],
-    )
-    return np.asarray(np.take_along_axis(facets, np.argsort(angle, axis=1), axis=1))
+__all__ = [
+    "BLUE", "GREEN", "GREY", "ORANGE", "contact_figure", "contact_line", "contact_place", "convergence", "deformed", "magnification",
+    "mirror_plane", "pressure", "stick_map", "traction",
+]  # fmt: skip
+STRAIGHT = 1e-6  # a contact line that leaves its chord by less than this fraction of its length
+CENTRED = 0.1  # a contact zone whose centre is off the origin by less than this fraction of its half-width
 
 
 def contact_line(problem: InterfaceProblem) -> np.ndarray:
-    """Contact nodes along the first direction of the surface, in order; in 3D those of the row nearest to its origin."""
+    """Contacts along the first direction of the surface, in order; in 3D those of the row nearest to its origin.
+
+    A closed line is cut opposite to its origin, so that its places grow from -period / 2 to period / 2.
+    """
     x = problem.chart.places
     row = np.ones(x.shape[1], dtype=bool)
     if problem.dim == 3:
         nearest = x[1, np.argmin(np.abs(x[1]))]
         row = np.abs(x[1] - nearest) <= 1e-6 * (1e-300 + np.ptp(x[1]))
     chosen = np.flatnonzero(row)
-    return np.asarray(chosen[np.argsort(x[0, chosen])])
+    return np.asarray(chosen[np.argsort(contact_place(problem)[chosen], kind="stable")])
+
+
+def contact_place(problem: InterfaceProblem) -> np.ndarray:
+    """Places (k,) along the first direction of the surface, of a closed line from its origin either way [length]."""
+    x, period = problem.chart.places[0], problem.chart.period
+    return x if period is None else np.asarray((x + period / 2) % period - period / 2)
+
+
+def in_rows(problem: InterfaceProblem) -> bool:
+    """Whether a row of contacts crosses the surface, so that values can be drawn along it; always in 2D."""
+    return problem.dim == 2 or len(contact_line(problem)) >= max(3.0, np.sqrt(problem.contacts) / 3)
+
+
+def _place_label(scene: Scene, problem: InterfaceProblem) -> str:
+    """What the places along the contact line are: a coordinate where the line follows an axis, otherwise arc length."""
+    if problem.dim == 3:
+        return "x"
+    return scene.components[0] if _straight(problem) else "arc length s"
+
+
+def _straight(problem: InterfaceProblem) -> bool:
+    """Whether the contact line follows the first coordinate; true of every surface in 3D, which has its own figures."""
+    extent = np.ptp(problem.coordinates, axis=1)
+    return problem.dim == 3 or len(extent) < 2 or bool(extent[1] <= STRAIGHT * extent[0])
 
 
 def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
-    """Contact pressure over its mean against position over half-width (paper, figure 3), with the exact curve."""
-    ax = _axes(ax)
-    line = contact_line(problem)
-    x = problem.chart.places[0, line]
-    p = solution.reactions[line, 0] / problem.areas[line]
+    """Contact pressure over its mean against position over half-width (paper, figure 3), with the exact curve.
+
+    The position is divided by the half-width where the contact zone lies about the origin; elsewhere it is a length.
+    """
+    if not in_rows(problem):
+        values = solution.reactions[:, 0] / problem.areas
+        return _map(scene, problem, values, f"pressure [{scene.units[1]}]", make_axes(ax))
+    ax = make_axes(ax)
+    line, place = contact_line(problem), contact_place(problem)
+    x, p = place[line], solution.reactions[line, 0] / problem.areas[line]
     a = contact_edge(scene, problem, solution.reactions)
     mean = solution.reactions[:, 0].sum() / contact_area(scene, a) if a > 0 else 0.0
-    a, mean = a or 1.0, mean or 1.0
-    ax.plot(x / a, p / mean, "o-", color=BLUE, ms=4, lw=1, label="contactopt")
+    scaled, mean = _about_origin(problem, solution, place, a), mean or 1.0
+    unit = a if scaled else 1.0
+    ax.plot(x / unit, p / mean, "o-", color=BLUE, ms=4, lw=1, label="contactopt")
     if scene.reference is not None:
         fine = np.linspace(x.min(), x.max(), 801)
         with np.errstate(all="ignore"):
             exact = scene.reference.pressure(fine) / mean
-        ax.plot(fine / a, exact, color=ORANGE, lw=1.5, label=f"exact: {scene.reference.label}", zorder=1)
-    across = scene.components[0]
-    where = ", y = 0" if problem.dim == 3 else ""
+        ax.plot(fine / unit, exact, color=ORANGE, lw=1.5, label=f"exact: {scene.reference.label}", zorder=1)
+    name, where = _place_label(scene, problem), ", y = 0" if problem.dim == 3 else ""
+    length = scene.units[0]
     ax.set(
-        xlabel=f"{across} / a [-]{where}, a = {a:.4g} {scene.units[0]}",
+        xlabel=f"{name} / a [-]{where}, a = {a:.4g} {length}" if scaled else f"{name} [{length}]{where}",
         ylabel=f"p / mean p [-], mean p = {mean:.4g} {scene.units[1]}",
-        ylim=(0, 5.0 if _singular(scene) else 1.15 * float((p / mean).max() or 1.0)),
+        ylim=(0, 5.0 if singular(scene) else 1.15 * float((p / mean).max() or 1.0)),
     )
     ax.legend(frameon=False)
     return ax
 
 
+def _about_origin(problem: InterfaceProblem, solution: Solution, place: np.ndarray, half_width: float) -> bool:
+    """Whether the contacts that touch are one zone about the origin, of which the half-width is the measure."""
+    touching = contact_status(problem, solution.reactions).touching
+    if half_width <= 0 or not touching.any():
+        return False
+    if touching.all() and not _straight(problem):
+        return False
+    first, last = place[touching].min(), place[touching].max()
+    if problem.chart.mirrored[0]:
+        return bool(first <= CENTRED * half_width)
+    return bool(abs(first + last) / 2 <= CENTRED * half_width and last - first <= 2.5 * half_width)
+
+
 def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
     """Tangential traction against position with the friction bound; sticking and slipping nodes marked."""
-    ax = _axes(ax)
-    line = contact_line(problem)
-    x = problem.chart.places[0, line]
-    t = solution.reactions[line, 1] / problem.areas[line]
+    if not in_rows(problem):
+        values = np.linalg.norm(solution.reactions[:, 1:], axis=1) / problem.areas
+        return _map(scene, problem, values, f"size of the tangential traction [{scene.units[1]}]", make_axes(ax))
+    ax = make_axes(ax)
+    line, place = contact_line(problem), contact_place(problem)
+    x, t = place[line], solution.reactions[line, 1] / problem.areas[line]
     bound = problem.mu[line] * np.abs(solution.reactions[line, 0]) / problem.areas[line]
     status = contact_status(problem, solution.reactions)
     ax.plot(x, bound, color=GREY, lw=1, ls="--", label="friction bound, +/- mu p")
@@ -201,24 +129,40 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
             exact = -scene.reference.shear(fine)
         exact[np.abs(exact) > 1.1 * bound.max(initial=0.0)] = np.nan  # singular at the edge of a punch
         ax.plot(fine, exact, color="black", lw=1, label=f"exact: {scene.reference.label}", zorder=3)
-    if _singular(scene) and np.any(bound):
+    if singular(scene) and np.any(bound):
         mean = float(np.average(bound, weights=problem.areas[line]))
         ax.set_ylim(-5 * mean, 5 * mean)
     sticking, slipping = status.stick[line], status.slip[line]
-    ax.plot(x[sticking], t[sticking], "o", color=BLUE, ms=5, label="stick")
-    ax.plot(x[slipping], t[slipping], "s", color=ORANGE, ms=5, mfc="white", label="slip")
-    across = scene.components[0]
-    where = ", y = 0" if problem.dim == 3 else ""
+    if sticking.any():
+        ax.plot(x[sticking], t[sticking], "o", color=BLUE, ms=5, label="stick")
+    if slipping.any():
+        ax.plot(x[slipping], t[slipping], "s", color=ORANGE, ms=5, mfc="white", label="slip")
+    name, where = _place_label(scene, problem), ", y = 0" if problem.dim == 3 else ""
     ax.set(
-        xlabel=f"{across} [{scene.units[0]}]{where}", ylabel=f"tangential traction on the upper body [{scene.units[1]}]"
+        xlabel=f"{name} [{scene.units[0]}]{where}", ylabel=f"tangential traction on the upper body [{scene.units[1]}]"
     )
     ax.legend(frameon=False)
     return ax
 
 
+def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str, ax: Any) -> Any:
+    """Values (k,) of the contacts of a surface as colours over its chart."""
+    x, y = problem.chart.places
+    cells = problem.chart.cells
+    if cells is None or len(cells) not in (3, 4):
+        drawn = ax.scatter(x, y, c=values, s=14, cmap="viridis")
+    else:
+        corners = cells.T
+        triangles = np.concatenate([corners[:, :3], corners[:, [0, 2, 3]]]) if corners.shape[1] == 4 else corners
+        drawn = ax.tripcolor(x, y, triangles, values, shading="gouraud", cmap="viridis")
+    ax.set(xlabel=f"x [{scene.units[0]}]", ylabel=f"y [{scene.units[0]}]", aspect="equal")
+    ax.figure.colorbar(drawn, ax=ax, label=label, shrink=0.8)
+    return ax
+
+
 def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
     """Contact patch of a 3D scene: sticking, slipping and open nodes, with the tangential traction as arrows."""
-    ax = _axes(ax)
+    ax = make_axes(ax)
     x, y = problem.chart.places
     status = contact_status(problem, solution.reactions)
     for mask, colour, marker, label in (
@@ -249,7 +193,10 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
     from matplotlib.figure import Figure
 
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
-    figure = Figure(figsize=(5.4 * len(panels), 4.2), layout="constrained")
+    # Two plain panels have fixed places, because working out places takes as long as drawing.
+    figure = Figure(figsize=(5.4 * len(panels), 4.2), layout="constrained" if problem.dim == 3 else None)
+    if problem.dim == 2:
+        figure.subplots_adjust(left=0.065, right=0.985, bottom=0.13, top=0.91, wspace=0.23)
     for draw, ax in zip(panels, figure.subplots(1, len(panels))):
         draw(scene, problem, solution, ax)
     figure.suptitle(f"{scene.name}, {scene.friction}: {solution.status}, residual {solution.residual:.1e}")
@@ -258,10 +205,41 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
 
 def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
     """Natural-map residual against outer iterations, one line per solve."""
-    ax = _axes(ax)
+    ax = make_axes(ax)
     for colour, (label, solution) in zip((BLUE, ORANGE, GREEN, GREY, "#CC79A7", "#56B4E9"), solutions.items()):
         residual = [h["residual"] for h in solution.history]
         ax.semilogy(range(1, len(residual) + 1), residual, "o-", ms=3, color=colour, label=label)
     ax.set(xlabel="outer iteration", ylabel="natural-map residual [-]")
+    ax.legend(frameon=False)
+    return ax
+
+
+def fit(found: Fit, ax: Any = None) -> Any:
+    """What the model leaves of the data, over the standard deviation of the noise, state by state."""
+    ax = make_axes(ax)
+    for (name, measured), colour in zip(found.data.items(), (BLUE, ORANGE, GREEN, GREY)):
+        rest = (measured - found.model[name]) / (found.noise[name] or 1.0)
+        ax.plot(np.arange(len(rest)), rest, "o-", color=colour, lw=0.8, ms=4, label=name)
+    ax.axhline(0.0, color=GREY, lw=0.8)
+    ax.axhspan(-1.96, 1.96, color=GREY, alpha=0.12, lw=0, label="95 % of normal noise")
+    ax.set(xlabel="state", ylabel="(measured - computed) / noise")
+    ax.set_title("; ".join(f"{name} = {value:.4g}" for name, value in found.values.items()))
+    ax.legend(frameon=False)
+    return ax
+
+
+def design(found: Design, ax: Any = None) -> Any:
+    """The pressure of the designed contact over the place along the surface, and its mean."""
+    ax = make_axes(ax)
+    problem = found.reduction.problem
+    place = problem.chart.places[0]
+    order = np.argsort(place)
+    touching = problem.law.pressed(found.solution.reactions)
+    mean = float(np.average(found.pressure[touching], weights=problem.areas[touching]))
+    unit, stress = found.reduction.scene.units
+    ax.plot(place[order], found.pressure[order], "." if problem.dim == 3 else ".-", color=BLUE, label="pressure")
+    ax.axhline(mean, color=GREY, lw=0.8, label="mean over the contact")
+    ax.set(xlabel=f"place [{unit}]", ylabel=f"pressure [{stress}]", ylim=(0.0, 1.2 * found.peak))
+    ax.set_title(f"{found.reduction.scene.name}: largest over mean pressure {found.unevenness:.4f}")
     ax.legend(frameon=False)
     return ax

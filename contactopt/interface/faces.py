@@ -41,6 +41,8 @@ class Faces:
             outward, -1 where it points inward
     weight  of the integrals: a factor, and whether it is multiplied by r (contactopt.bodies.elements.weight_at)
     curve   function (dim, m) -> (dim, m) that puts points of the faces on the true surface; None: the faces are it
+    mirror  (dim, n) components across planes of symmetry that nodes lie in: what is modelled is half of what is there;
+            None: there is no such plane
     """
 
     name: str
@@ -51,6 +53,7 @@ class Faces:
     turn: np.ndarray
     weight: tuple[float, bool] = (1.0, False)
     curve: Callable[[np.ndarray], np.ndarray] | None = None
+    mirror: np.ndarray | None = None
 
     @property
     def dim(self) -> int:
@@ -111,6 +114,12 @@ class Faces:
             place += x * value
             tangents += x[:, None] * rate
         return place, tangents
+
+    def mirrored(self, vectors: np.ndarray, nodes: np.ndarray | None = None) -> np.ndarray:
+        """Vectors (dim, k) at some nodes (k,), or at all, summed up with their mirror images: none points out of its plane."""
+        if self.mirror is None:
+            return vectors
+        return np.where(self.mirror if nodes is None else self.mirror[:, nodes], 0.0, vectors)
 
     def true(self, x: np.ndarray) -> np.ndarray:
         """Points (dim, m) of the faces moved to the true surface."""

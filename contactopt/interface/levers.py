@@ -30,7 +30,8 @@ def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) ->
 def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[list[sp.csr_matrix]]:
     """Matrices [c][d] (k, n) from displacements d of the own nodes to component c of omega_i x l_i.
 
-    omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas of the faces.
+    omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas of the faces. In a plane of
+    symmetry, where the mirror images of these faces count as well, it turns about the normal of the plane alone.
     """
     f, size = len(own.faces), own.points.shape[1]
     corners = own.points[:, own.faces[:, : own.corners]]
@@ -39,11 +40,16 @@ def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[li
     incident = sp.csr_matrix((np.ones(own.faces.size), (own.faces.ravel(), columns)), (size, f))
     needed = sp.diags(np.any(lever != 0, axis=0).astype(float))
     around = sp.csr_matrix(needed @ incident[nodes] @ sp.diags(radius ** (own.dim - 1)) @ incident.T)
-    return _rotations(around, own.points, lever)
+    about = np.ones((3, len(nodes)), dtype=bool)  # the axes about which the surface turns at a contact
+    for c, there in enumerate(own.mirror[:, nodes] if own.mirror is not None else ()):
+        about[np.arange(3) != c] &= ~there
+    return _rotations(around, own.points, lever, about)
 
 
-def _rotations(around: sp.csr_matrix, points: np.ndarray, lever: np.ndarray) -> list[list[sp.csr_matrix]]:
-    """As above, from the weights (k, n) of the nodes around every contact; in the plane, embedded in space."""
+def _rotations(
+    around: sp.csr_matrix, points: np.ndarray, lever: np.ndarray, about: np.ndarray
+) -> list[list[sp.csr_matrix]]:
+    """As above, from the weights (k, n) of the nodes around every contact, and its axes (3, k); in the plane, embedded in space."""
     dim, k = lever.shape
     w = sp.coo_matrix(around)
     active = w.data > 0
@@ -58,6 +64,7 @@ def _rotations(around: sp.csr_matrix, points: np.ndarray, lever: np.ndarray) -> 
     cross3 -= cross3.transpose(0, 2, 1)
     moments = -np.einsum("g,gab,gbc->gac", weight, cross3, cross3)
     J = np.stack([np.bincount(i, m, k) for m in moments.reshape(len(i), 9).T], axis=1).reshape(k, 3, 3)
+    J = np.where(about.T[:, :, None] & about.T[:, None, :], J, 0.0)
     inverse = np.linalg.pinv(J, rcond=1e-10, hermitian=True)
     arm = np.zeros((k, 3, 3))  # -(lever x) = x lever
     tall = np.zeros((3, k))

@@ -16,6 +16,7 @@ from contactopt.scenes.scene import Scene
 MATCH = 1e-6  # nodes match within this fraction of the shortest distance between contact nodes
 LOOSEST = 0.25  # and, where normals of a curved surface are known to its turn only, never beyond this fraction
 NEAREST = 8  # nodes among which the nearest one that faces a node is looked for
+REMEDY = "give both meshes the same nodes there, or couple the surfaces with Contact(..., coupling='mortar')"
 STEPS = 20  # of the search along a normal, which usually takes two
 CHUNK = 256  # nodes that are compared with all others at a time
 
@@ -96,7 +97,7 @@ def match(upper: Surface, lower: Surface) -> np.ndarray:
     if upper.points.shape[1] != k:
         raise InputError(
             f"interface nodes do not match: body '{upper.body}' has {upper.points.shape[1]} contact nodes, "
-            f"body '{lower.body}' has {k}; give both meshes the same nodes there."
+            f"body '{lower.body}' has {k}; {REMEDY}."
         )
     if np.array_equal(upper.points, lower.points):
         return np.arange(k)
@@ -117,7 +118,7 @@ def match(upper: Surface, lower: Surface) -> np.ndarray:
     raise InputError(
         f"interface nodes do not match: a contact node of body '{upper.body}' lies {min(distances):.3g} off "
         f"the normal through the nearest one of body '{lower.body}' (spacing {spacing:.3g}); "
-        "give both meshes the same nodes there."
+        f"{REMEDY}."
     )
 
 

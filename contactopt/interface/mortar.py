@@ -41,6 +41,10 @@ displacement (contactopt.interface.kinks): otherwise finer contacts would follow
 **Frames.** Normals are those of the lower body, whichever side carries the contacts: as everywhere, and so that the answer
 does not depend on the choice.
 
+**Planes of symmetry.** At a contact in such a plane the model holds one half of the faces around it. What the whole would give
+is the sum with the mirror image: normals, gaps and levers have no component out of the plane, and the mean rotation none about axes
+in it (Faces.mirror). Otherwise a gap that closes along the plane would also be a slip, and raise friction.
+
 **Contacts that are supported.** Where a support holds a component at a contact's node, that component of u_i is taken from
 this node alone, and from the other body at the place that faces it (`alone`); on a plane of symmetry both are at
 rest. The cone of the contact is untouched.
@@ -115,7 +119,7 @@ class Mortar:
         W, alone = self.weights[body], self.alone[body]
         made = [[sp.csr_matrix(W.shape)] * dim for _ in range(dim)]
         for c in range(dim):
-            made[c][c] = W - sp.diags(held[c].astype(float)) @ (W - alone)
+            made[c][c] = W - sp.diags(held[c].astype(float)) @ (W - alone) if held[c].any() else W
             if body == self.own and self.carried:
                 free = sp.diags((~held[c]).astype(float))
                 made[c] = [there - free @ part for there, part in zip(made[c], self.carried[c])]
@@ -145,11 +149,13 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
         )
     sums = integrate(mine, theirs, points)
     n = normals[:, sums.nodes] if first == 1 else _seen(theirs, sums.other)
-    gap = -sign * np.sum(n * sums.apart, axis=0)
+    n = mine.mirrored(n, sums.nodes)
+    n = n / np.linalg.norm(n, axis=0)
+    gap = -sign * np.sum(n * mine.mirrored(sums.apart, sums.nodes), axis=0)
     lever = np.zeros_like(n)
     if not mine.weight[1]:
         e = sums.own @ mine.points.T - sums.other @ theirs.points.T
-        lever = levers(e.T, -sign * n, gap, sizes[sums.nodes])
+        lever = levers(mine.mirrored(e.T, sums.nodes), -sign * n, gap, sizes[sums.nodes])
     carried = rotations_times(lever, mine, sums.nodes) if np.any(lever) else []
     x = mine.points[:, sums.nodes]
     if sums.least < -OVERLAP * np.ptp(x, axis=1).max():
@@ -198,6 +204,7 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
             area += np.bincount(node, length @ (phi[v] * share), n)
             for d in range(len(total)):
                 total[d] += np.bincount(node, split[d] @ (dual[v] * share), n)
+    total = surface.mirrored(total)
     normals = np.divide(total, np.linalg.norm(total, axis=0), where=area > 0, out=np.zeros_like(total))
     return normals, area ** (1 / (surface.dim - 1))
 

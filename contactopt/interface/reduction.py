@@ -27,6 +27,7 @@ from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
 from contactopt.bodies.protocol import AssembledBody, Body
 from contactopt.bodies.ranks import RemotePart
+from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
@@ -38,6 +39,7 @@ from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
 from contactopt.problem.operators import (
     FORMS,
+    Interface,
     InterfaceOperator,
     Product,
     check_dense,
@@ -68,6 +70,21 @@ class Reduction:
     maps: tuple[sp.csr_matrix, ...]
     couplings: tuple[Coupling, ...]
     seconds: dict[str, float]
+
+    def __repr__(self) -> str:
+        unknowns, pairs = (
+            count(self.dofs, "unknown"),
+            count(len(self.couplings), "pair of surfaces", "pairs of surfaces"),
+        )
+        return line("Reduction", self.scene.name, unknowns, count(self.problem.contacts, "contact"), pairs)
+
+    def _repr_html_(self) -> str:
+        rows: dict[str, object] = {"scene": self.scene.name, "kind": self.scene.kind}
+        for body in self.bodies:
+            rows[f"body {body.name}"] = count(body.unknowns, "unknown")
+        for pair, coupling in zip(self.problem.pairs, self.couplings):
+            rows[f"surfaces {pair.name}"] = f"{count(len(coupling.gap), 'contact')}, coupled by {coupling.kind}"
+        return card("Reduction", rows)
 
     @property
     def coupling(self) -> Coupling:
@@ -128,9 +145,7 @@ class Reduction:
         start = time.perf_counter()
         pairs = zip(self.bodies, scene.parts)
         bodies = each(lambda pair: pair[0].loaded(scene, pair[1]), pairs, [body.parallel for body in self.bodies])
-        q, V, s = _linear_terms(bodies, self.maps, self.couplings)
-        law = _law(scene.pairs, self.couplings)
-        problem = replace(self.problem, q=q, V=V, s=s, law=law, motions=_names(bodies))
+        problem = _problem(scene, self.problem.Q, bodies, self.maps, self.couplings)
         seconds = {"load": time.perf_counter() - start}
         return replace(self, scene=scene, problem=problem, bodies=bodies, seconds=seconds)
 
@@ -259,14 +274,8 @@ def reduce_bodies(
     seconds["factorise"] = time.perf_counter() - start
 
     start = time.perf_counter()
-    q, V, s = _linear_terms(bodies, maps, coupled)
     made = _operator(bodies, maps, coupled) if Q == "implicit" else _entries(bodies, maps)
-    areas = np.concatenate([part.areas for part in coupled])
-    points = np.concatenate([part.positions for part in coupled], axis=1)
-    pairs = _pairs(scene, coupled)
-    chart = pairs[0].chart if len(pairs) == 1 else None
-    law, names = _law(scene.pairs, coupled), _names(bodies)
-    problem = InterfaceProblem(made, q, law, V, s, areas, points, chart, pairs, names)
+    problem = _problem(scene, made, bodies, maps, coupled)
     seconds["compliance"] = time.perf_counter() - start
     return Reduction(scene, problem, bodies, maps, coupled, seconds)
 
@@ -275,15 +284,18 @@ def _map_of(
     body: AssembledBody, sides: Sequence[tuple[AssembledBody, AssembledBody]], couplings: Sequence[Coupling]
 ) -> sp.csr_matrix:
     """B (k dim, n) of a body: the maps of the pairs that it takes part in, with their signs, and zeros elsewhere."""
-    blocks: list[sp.csr_matrix | int] = []
-    width = 0
-    for (upper, lower), made in zip(sides, couplings):
-        rows = made.frames.shape[0] * made.frames.shape[1]
-        own = made.upper if body is upper else -made.lower if body is lower else None
-        blocks.append(rows if own is None else own)
-        width = width if own is None else own.shape[1]
-    filled = [sp.csr_matrix((block, width)) if isinstance(block, int) else block for block in blocks]
-    return filled[0] if len(filled) == 1 else sp.csr_matrix(sp.vstack(filled, format="csr"))
+    ends = np.cumsum([0, *(made.frames.shape[0] * made.frames.shape[1] for made in couplings)])
+    blocks = [
+        (first, made.upper if body is upper else -made.lower)
+        for first, (upper, lower), made in zip(ends, sides, couplings)
+        if body is upper or body is lower
+    ]
+    width = blocks[0][1].shape[1]
+    entries = [(first, sp.coo_matrix(block)) for first, block in blocks]
+    rows = np.concatenate([first + block.row for first, block in entries])
+    columns = np.concatenate([block.col for _, block in entries])
+    values = np.concatenate([block.data for _, block in entries])
+    return sp.csr_matrix((values, (rows, columns)), (int(ends[-1]), width))
 
 
 def _pairs(scene: Scene, couplings: Sequence[Coupling]) -> tuple[Pair, ...]:
@@ -319,6 +331,10 @@ def _operator(
     kernels = [body.convolution(B) for body, B in zip(bodies, maps) if body.moved(B).any()]
     if kernels and all(kernel is not None for kernel in kernels):
         known = [kernel for kernel in kernels if kernel is not None]
+        if len({kernel.padded for kernel in known}) > 1:
+            raise InputError(
+                "one half-space repeats itself periodically and the other does not; make both periodic or none."
+            )
         return Convolution(sum(known[1:], known[0]))
     moved = [body.moved(B) for body, B in zip(bodies, maps)]
     moving = [(body, B, _rows(B)) for body, B, moves in zip(bodies, maps, moved) if moves.any()]
@@ -355,29 +371,36 @@ def _filling(maps: Sequence[sp.csr_matrix]) -> int:
 def _entries(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarray | sp.csr_array:
     """Q by its entries, symmetric to the last digit: an array, or sparse rows where most pairs share no body."""
     n = maps[0].shape[0]
-    thin = _filling(maps) < SPARSE * n**2
-    Q = sp.csr_array((n, n)) if thin else np.zeros((n, n))
     moving = [(body, B, _rows(B)) for body, B in zip(bodies, maps) if body.moved(B).any()]
     parallel = [body.parallel for body, *_ in moving]
-    for (*_, rows), C in zip(moving, each(lambda term: term[0].compliance(term[1][term[2]]), moving, parallel)):
-        if thin:
-            place = np.repeat(rows, len(rows)), np.tile(rows, len(rows))
-            Q = Q + sp.csr_array((C.ravel(), place), (n, n))
-        elif len(rows) == n:
-            Q += C
+    made = each(lambda term: term[0].compliance(term[1][term[2]]), moving, parallel)
+    parts = [(rows, own) for (*_, rows), own in zip(moving, made)]
+    if _filling(maps) < SPARSE * n**2:
+        rows = np.concatenate([np.repeat(rows, len(rows)) for rows, _ in parts])
+        columns = np.concatenate([np.tile(rows, len(rows)) for rows, _ in parts])
+        return sp.csr_array((np.concatenate([own.ravel() for _, own in parts]), (rows, columns)), (n, n))
+    Q = np.zeros((n, n))
+    for rows, own in parts:
+        if len(rows) == n:
+            Q += own
         else:
-            Q[np.ix_(rows, rows)] += C
+            Q[np.ix_(rows, rows)] += own
     return Q
 
 
-def _linear_terms(
-    bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """q (k, dim), V (k dim, p) and s (p,)."""
+def _problem(
+    scene: Scene, Q: Interface, bodies: Sequence[Body], maps: Sequence[sp.csr_matrix], couplings: Sequence[Coupling]
+) -> InterfaceProblem:
+    """The interface problem of a scene whose bodies and couplings are made and whose Q is known."""
     gap = np.concatenate([made.gap for made in couplings])
     q = np.zeros((len(gap), maps[0].shape[0] // max(len(gap), 1)))
     q[:, 0] = gap
     for body, B in zip(bodies, maps):
         q += (B @ body.at_rest).reshape(q.shape)
     V = np.concatenate([B @ body.motions for body, B in zip(bodies, maps)], axis=1)
-    return q, V, np.concatenate([body.resultants for body in bodies])
+    s = np.concatenate([body.resultants for body in bodies])
+    areas = np.concatenate([made.areas for made in couplings])
+    points = np.concatenate([made.positions for made in couplings], axis=1)
+    pairs = _pairs(scene, couplings)
+    chart = pairs[0].chart if len(pairs) == 1 else None
+    return InterfaceProblem(Q, q, _law(scene.pairs, couplings), V, s, areas, points, chart, pairs, _names(bodies))

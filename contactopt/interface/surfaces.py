@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.protocol import AssembledBody, Mesh, Surface
 from contactopt.errors import InputError
-from contactopt.interface.charts import ContactPoints, lay_out, symmetry_planes
+from contactopt.interface.charts import NEAR, ContactPoints, lay_out, symmetry_planes
 from contactopt.interface.coupling import Coupling, renumbered
 from contactopt.interface.faces import Faces, faces_of
-from contactopt.interface.mortar import Mortar, mortar
+from contactopt.interface.mortar import Mortar, contact_normals, mortar
 from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.scene import Scene
 
@@ -44,7 +45,7 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
         If a body has no mesh on its contact surface, or if the surfaces face each other nowhere.
     """
     meshes = [_mesh(body.surface(name)) for body, name in zip((upper, lower), pair.surfaces)]
-    sides = [_faces(body.name, mesh) for body, mesh in zip((upper, lower), meshes)]
+    sides = _halved([_faces(body.name, mesh) for body, mesh in zip((upper, lower), meshes)], meshes)
     m = mortar(sides[0], sides[1], pair.carrier)
     mine, theirs = meshes[m.own], meshes[1 - m.own]
     own_held = mine.held[mine.unknowns[:, m.nodes]]
@@ -61,12 +62,42 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
 
 def _mesh(surface: Surface) -> Mesh:
     if surface.mesh is None:
-        raise InputError(f"body '{surface.body}' has no mesh on its contact surface; couple it by matching nodes.")
+        raise InputError(
+            f"body '{surface.body}' has no mesh on its contact surface, so that its points must be those of the other surface."
+        )
     return surface.mesh
 
 
 def _faces(name: str, mesh: Mesh) -> Faces:
     return faces_of(name, mesh.kind, mesh.degree, mesh.faces, mesh.outward, mesh.measure, mesh.locations, mesh.curve)
+
+
+def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
+    """Both surfaces with the nodes that lie in a plane of symmetry of both."""
+    planes = [symmetry_planes(_vertices(side, mesh)) for side, mesh in zip(sides, meshes)]
+    size = max(float(np.ptp(side.points[:, np.unique(side.faces)], axis=1).max()) for side in sides)
+    common = [
+        plane
+        for plane in planes[0]
+        if any(np.all(plane.inward == p.inward) and abs(plane.offset - p.offset) <= NEAR * size for p in planes[1])
+    ]
+    if not common:
+        return sides
+    made = []
+    for side in sides:
+        mirror = np.zeros(side.points.shape, dtype=bool)
+        for plane in common:
+            mirror[plane.inward != 0] |= plane.contains(side.points, size)
+        made.append(replace(side, mirror=mirror))
+    return made
+
+
+def _vertices(side: Faces, mesh: Mesh) -> ContactPoints:
+    """All vertices of the linear cells of a surface, as candidates for contacts."""
+    nodes, cells = np.unique(side.faces[:, side.cells].reshape(-1, side.cells.shape[1]), return_inverse=True)
+    held, none = mesh.held[mesh.unknowns[:, nodes]], np.zeros(len(nodes))
+    normals = contact_normals(side)[0][:, nodes]
+    return ContactPoints(side.points[:, nodes], normals, none, cells.reshape(-1, side.cells.shape[1]).T, held, none)
 
 
 def _cells(side: Faces, nodes: np.ndarray) -> np.ndarray:
@@ -80,12 +111,19 @@ def _cells(side: Faces, nodes: np.ndarray) -> np.ndarray:
 def _map(m: Mortar, body: int, mesh: Mesh, held: np.ndarray, frames: np.ndarray, order: np.ndarray) -> sp.csr_matrix:
     """T (k dim, n): the body's unknowns -> its part of the displacement of the contacts, in the frames and their order."""
     k, dim = frames.shape[:2]
-    rows, columns = np.arange(k * dim), np.repeat(np.arange(k), dim)
-    T = sp.csr_matrix((k * dim, len(mesh.held)))
+    place = np.empty(k, dtype=int)
+    place[order] = np.arange(k)
+    rows, columns, values = [], [], []
     for c, row in enumerate(m.components(body, held)):
-        turn = sp.csr_matrix((frames[:, :, c].ravel(), (rows, columns)), (k * dim, k))
         for unknowns, part in zip(mesh.unknowns, row):
-            entries = sp.coo_matrix(turn @ part[order])
-            T = T + sp.csr_matrix((entries.data, (entries.row, unknowns[entries.col])), T.shape)
+            if not part.nnz:
+                continue
+            entries = sp.coo_matrix(part)
+            contact = place[entries.row]
+            rows.append((contact[:, None] * dim + np.arange(dim)).ravel())
+            columns.append(np.repeat(unknowns[entries.col], dim))
+            values.append((frames[contact, :, c] * entries.data[:, None]).ravel())
+    index = np.concatenate(rows), np.concatenate(columns)
+    T = sp.csr_matrix((np.concatenate(values), index), (k * dim, len(mesh.held)))
     T.eliminate_zeros()
     return T

@@ -3,8 +3,9 @@
 Every solution has forces r in the friction cones K with V' r + s = 0. A motion z (p,) of the free bodies that every contact
 lets pass, V z in the dual cone of K, g_n >= mu |g_t| at each contact, has z' V' r >= 0 for all such r. Where it moves the
 loads forward, s' z > 0, this contradicts z' V' r = -s' z: there is no solution, and the bodies fly apart, slide off or
-topple along z. Where nonnegative least squares finds forces that balance the loads there is no such motion. Otherwise the search
-is a linear program with a polygon inside each cone; what it finds is checked on its own.
+topple along z. Where forces in the cones are found that balance the loads there is no such motion: nonnegative least squares
+looks for them, or, among many bodies, a sparse linear program. Otherwise the search for the motion is a linear program with a polygon
+inside each cone; what it finds is checked on its own.
 
 Source: Farkas' lemma for cones; Boyd, Vandenberghe (2004), Convex Optimization, section 5.9.
 """
@@ -15,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.optimize import linprog, nnls
 
 from contactopt.problem.interface_problem import InterfaceProblem
 
@@ -25,7 +25,8 @@ SLACK = 1e-9  # by how much rounding may violate the cones, over the size of the
 BALANCED = 1e-10  # relative error of a balance that counts as exact
 FLAT = 1e-6  # share of the motion of the contacts below which they do not slide
 TURNING = 1e-3  # least displacement by a rotation, over the largest, of a body that tips over
-SECONDS = 5.0  # for the linear program
+SECONDS = 5.0  # for a linear program
+FEW = 30  # multipliers up to which nonnegative least squares, of cubic cost, is faster than a sparse linear program
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,23 +78,38 @@ def _ways(dim: int) -> np.ndarray:
 
 
 def _balanced(problem: InterfaceProblem, s: np.ndarray) -> bool:
-    """Whether forces in polygons inside the cones are found that balance the loads, by nonnegative least squares."""
-    k, d = problem.q.shape
-    blocks = problem.V.reshape(k, d, -1)
-    edges = [blocks[:, 0] + problem.mu[:, None] * np.einsum("d,kdp->kp", way, blocks[:, 1:]) for way in _ways(d)]
-    A = np.concatenate(edges if np.any(problem.mu) else [blocks[:, 0]]).T
-    sizes = np.linalg.norm(A, axis=1)
+    """Whether forces in polygons inside the cones are found that balance the loads."""
+    V, (k, d) = sp.csr_array(problem.V), problem.q.shape
+    normal = V[np.arange(k) * d]
+    slopes = [sum(c * V[np.arange(k) * d + 1 + i] for i, c in enumerate(way)) for way in _ways(d)]
+    edges = [normal + sp.diags_array(problem.mu) @ slope for slope in slopes] if np.any(problem.mu) else [normal]
+    A = sp.csc_array(sp.vstack(edges).T)
+    sizes = np.sqrt(np.asarray((A * A).sum(axis=1)).ravel())
     if np.any(sizes == 0):
         return False
-    try:
-        _, error = nnls(A / sizes[:, None], -s / sizes)
-    except RuntimeError:  # too many iterations
-        return False
-    return bool(error <= BALANCED * np.linalg.norm(s / sizes))
+    A, b = sp.diags_array(1 / sizes) @ A, -s / sizes
+    forces = _nonnegative(A, b)
+    return forces is not None and bool(np.linalg.norm(A @ forces - b) <= BALANCED * np.linalg.norm(b))
+
+
+def _nonnegative(A: sp.csc_array, b: np.ndarray) -> np.ndarray | None:
+    """x >= 0 with A x near b; None if none is found."""
+    from scipy.optimize import linprog, nnls  # late, since it takes long to import
+
+    if len(b) <= FEW:
+        try:
+            return np.asarray(nnls(A.toarray(), b)[0])
+        except RuntimeError:  # too many iterations
+            return None
+    options = {"time_limit": SECONDS, "primal_feasibility_tolerance": BALANCED}
+    answer = linprog(np.zeros(A.shape[1]), A_eq=A, b_eq=b, method="highs-ds", options=options)
+    return None if answer.x is None else np.maximum(answer.x, 0.0)
 
 
 def _search(problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray) -> np.ndarray | None:
     """min |z|_1 over motions with s' z = 1 and V z in a polygon inside each dual cone; None if there are none."""
+    from scipy.optimize import linprog
+
     k, d = problem.q.shape
     normal = np.arange(k) * d
     ways, factor = _ways(d), 1.0 if d == 2 else 1 / np.cos(np.pi / DIRECTIONS)

@@ -13,6 +13,12 @@ def split(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return blocks[:, 0], blocks[:, 1:]
 
 
+def unit(t: np.ndarray) -> np.ndarray:
+    """The directions (k, d) of vectors t (k, d); zero where t is zero."""
+    length = np.linalg.norm(t, axis=1)[:, None]
+    return np.divide(t, length, out=np.zeros(t.shape), where=length > 0)
+
+
 def disc(t: np.ndarray, radius: np.ndarray) -> np.ndarray:
     """Nearest points of discs |t| <= radius: t (k, d), radius (k,) >= 0; an interval for d = 1."""
     length = np.linalg.norm(t, axis=1)

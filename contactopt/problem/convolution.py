@@ -17,7 +17,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.fft import fft, ifft, irfft, next_fast_len, rfft, rfftn
 
 from contactopt.problem.counter import Counter
 from contactopt.problem.operators import InterfaceOperator, check_dense
@@ -30,6 +29,8 @@ Symbols = dict[tuple[int, int], np.ndarray]  # (a, b) with a <= b -> real array
 
 def embedding(grid: tuple[int, ...]) -> tuple[int, ...]:
     """Sizes M of the padded grid: twice a number that is at least that of the contacts and easy to halve and to transform."""
+    from scipy.fft import next_fast_len
+
     return tuple(2 ** (LEVELS + 1) * int(next_fast_len(-(-n // 2**LEVELS), real=True)) for n in grid)
 
 
@@ -55,6 +56,8 @@ class Kernel:
     @classmethod
     def of_coefficients(cls, grid: tuple[int, ...], coefficients: Symbols) -> Kernel:
         """From the coefficients K_ab at distances 0 to M / 2 along each axis, M as `embedding` gives it."""
+        from scipy.fft import rfftn
+
         padded, symbols = embedding(grid), {}
         for (a, b), part in coefficients.items():
             odd, whole = odd_axes(a, b, len(grid)), part
@@ -177,6 +180,8 @@ def _negated(high: np.ndarray, axis: int, odd: tuple[bool, ...]) -> np.ndarray:
 
 def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
     """Fourier transform of x (*grid), padded by zeros; rows that hold nothing but padding are skipped."""
+    from scipy.fft import fft, rfft
+
     workers = workers_for(padded)
     spectrum = rfft(x, n=padded[-1], axis=-1, workers=workers)
     if len(padded) == 2:
@@ -186,6 +191,8 @@ def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
 
 def backward(spectrum: np.ndarray, padded: tuple[int, ...], grid: tuple[int, ...]) -> np.ndarray:
     """The part (*grid) of the inverse transform; `spectrum` is overwritten."""
+    from scipy.fft import ifft, irfft
+
     workers = workers_for(padded)
     if len(padded) == 2:
         spectrum = ifft(spectrum, axis=0, overwrite_x=True, workers=workers)[: grid[0]]

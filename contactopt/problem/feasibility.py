@@ -18,7 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.optimize import linprog
 
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.operators import InterfaceOperator, asymmetry
@@ -115,6 +114,8 @@ def verified(problem: InterfaceProblem, Q: sp.csr_array, weights: np.ndarray, mo
 
 def _program(problem: InterfaceProblem, Q: sp.csr_array, time_limit: float) -> tuple[np.ndarray, np.ndarray] | None:
     """min q' e + s' z over rays with y, z in the unit box; None if it is not negative or there is no answer in time."""
+    from scipy.optimize import linprog
+
     k, d = problem.q.shape
     normal = np.arange(k) * d
     G = sp.hstack([sp.csr_array(Q.T[:, normal]), sp.csr_array(problem.V)], format="csr")  # g from (y, z)

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.cards import card, count, line
 from contactopt.checks import given, real_array
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
@@ -138,6 +139,28 @@ class InterfaceProblem:
             return
         if diagonal(self.Q).min(initial=0.0) < -1e-12 * row_sizes(self.Q).max(initial=0.0):
             raise InputError("Q must be positive semidefinite, but it has a negative diagonal entry; check its sign.")
+
+    def __repr__(self) -> str:
+        facts = (count(self.contacts, "contact"), f"{self.dim}D", self._law, self._form)
+        return line("InterfaceProblem", *facts, count(len(self.s), "free motion") if len(self.s) else "")
+
+    def _repr_html_(self) -> str:
+        rows: dict[str, object] = {"contacts": self.contacts, "dimension": self.dim, "law": self._law, "Q": self._form}
+        rows["free motions"] = ", ".join(self.motions) or len(self.s)
+        if len(self.pairs) > 1:
+            rows["pairs of surfaces"] = ", ".join(pair.name for pair in self.pairs)
+        return card("InterfaceProblem", rows)
+
+    @property
+    def _law(self) -> str:
+        low, high = float(self.mu.min(initial=np.inf)), float(self.mu.max(initial=0.0))
+        friction = f"mu = {high:g}" if low >= high else f"mu = {low:g} to {high:g}"
+        return f"{type(self.law).__name__} {friction}" if self.contacts else type(self.law).__name__
+
+    @property
+    def _form(self) -> str:
+        form = "by products" if isinstance(self.Q, InterfaceOperator) else "sparse" if sp.issparse(self.Q) else "array"
+        return f"Q {form} of {self.q.size} x {self.q.size}"
 
     @property
     def contacts(self) -> int:

@@ -46,9 +46,7 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     force = balanced or _closing(problem) / compliance or 1.0
     length = force * compliance
     columns = np.where(columns > 0, columns, 1.0)
-    sizes = d if isinstance(problem.Q, InterfaceOperator) else row_sizes(problem.Q)
-    moves = [sizes, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
-    rigid = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
+    rigid = immovable(problem)
     Q: Interface
     if isinstance(problem.Q, InterfaceOperator):
         Q = problem.Q.scaled(1 / compliance, rigid.astype(float))
@@ -67,6 +65,13 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
         law=problem.law.scaled(force),
     )
     return scaled, Scales(force, length, length / columns)
+
+
+def immovable(problem: InterfaceProblem) -> np.ndarray:
+    """Mask (k dim,) of the components that neither forces nor multipliers nor q move."""
+    sizes = problem.Q.diagonal if isinstance(problem.Q, InterfaceOperator) else row_sizes(problem.Q)
+    moves = [sizes, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
+    return np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
 
 
 def _closing(problem: InterfaceProblem) -> float:

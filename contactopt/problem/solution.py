@@ -7,6 +7,7 @@ from enum import Enum
 
 import numpy as np
 
+from contactopt.cards import card, count, line
 from contactopt.problem.feasibility import Infeasible
 
 
@@ -66,3 +67,19 @@ class Solution:
     @property
     def solved(self) -> bool:
         return self.status is Status.SOLVED
+
+    def __repr__(self) -> str:
+        contacts = count(len(self.reactions), "contact")
+        steps = count(self.iterations, "iteration")
+        return line("Solution", self.status.label, f"residual {self.residual:.1e}", steps, self.method, contacts)
+
+    def _repr_html_(self) -> str:
+        rows = {
+            "status": f"{self.status.label}: {self.message or self.status.sentence}",
+            "residual (certificate)": f"{self.residual:.2e}",
+            "iterations": self.iterations,
+            "method": self.method,
+            "contacts": len(self.reactions),
+            "time": f"{sum(self.seconds.values()):.3g} s",
+        }
+        return card("Solution", rows | {f"note {n}": note for n, note in enumerate(self.notes, 1)})

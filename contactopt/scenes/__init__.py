@@ -6,7 +6,9 @@ only there. A load path is a tuple of scenes that differ in their loads alone; c
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
+from inspect import Parameter, signature
 from typing import TYPE_CHECKING, Any
 
 from contactopt.errors import InputError
@@ -128,11 +130,30 @@ def make_path(name: str, *, degree: int | None = None, simplices: bool = False, 
     return tuple(with_elements(scene, degree, simplices) for scene in _made(name, PATHS[name], changes))
 
 
+def _arguments(name: str, make: Callable[..., Any]) -> list[str]:
+    """The arguments of a function that makes a scene; one that hands `**changes` on takes those of the scene's own function."""
+    parameters = signature(make).parameters.values()
+    own = [parameter.name for parameter in parameters if parameter.kind is not Parameter.VAR_KEYWORD]
+    if len(own) == len(parameters):
+        return own
+    module, function = SCENES[name][:2]
+    scene = signature(getattr(import_module(f"contactopt.scenes.{module}"), function)).parameters
+    return [*own, *(argument for argument in scene if argument not in own)]
+
+
 def _made(name: str, entry: tuple[Any, ...], changes: dict[str, object]) -> Any:
     """What the function of a table's entry makes; InputError for arguments that it does not take."""
     module, function = entry[:2]
     fixed = entry[-1] if isinstance(entry[-1], dict) else {}
+    make = getattr(import_module(f"contactopt.scenes.{module}"), function)
+    known = [argument for argument in _arguments(name, make) if argument not in fixed]
+    for argument in changes:
+        if argument not in known:
+            raise InputError(
+                f"scene '{name}' has no argument {argument!r}; its arguments are {', '.join(known)}, and degree and simplices "
+                "of every scene."
+            )
     try:
-        return getattr(import_module(f"contactopt.scenes.{module}"), function)(**fixed, **changes)
+        return make(**fixed, **changes)
     except TypeError as error:
         raise InputError(f"scene '{name}': {error}.") from error

@@ -32,12 +32,40 @@ def pin_in_bush(
     force: float = 100.0,
     elements: int = 24,
 ) -> Scene:
-    """A pin in the hole of a bush of the same material, pressed down by a force spread over it; plane strain.
+    """A pin in the hole of a bush of the same material, pressed down; plane strain, of which half is modelled.
 
-    Only contact holds the pin, whose radius is that of the hole less the clearance. The bush is clamped outside, at `outside`; by default that is 30 radii, which stand for an
-    infinite plate. Persson's solution is exact there without friction. The force acts as a force per volume: on the circle this has
-    the same radial displacements as a force at the centre but for a rigid motion.
-    Half model. Sizes in mm, force in N; elements across the contact half-width. The nodes divide the circles evenly.
+    Only contact holds the pin. The force acts on it as a force per volume. On the circle this has the same radial
+    displacements as a force at the centre, but for a rigid motion. The nodes divide the circles evenly. Lengths are
+    in mm, forces in N and Young's moduli in MPa.
+
+    Parameters
+    ----------
+    radius
+        Of the hole.
+    clearance
+        By how much the radius of the pin is smaller.
+    outside
+        Radius at which the bush is clamped. By default 30 radii of the hole, which stand for an infinite plate.
+    depth
+        Length of both bodies along the axis.
+    material
+        Of both bodies.
+    mu
+        Friction coefficient. Without friction Persson's solution is exact for an infinite plate.
+    force
+        Total force on the pin.
+    elements
+        Number of elements across the contact half-width.
+
+    Returns
+    -------
+    Scene
+        Named 'pin-in-bush', with Persson's solution where it is exact.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive, or the pin does not fit into the hole.
     """
     check_positive(radius=radius, clearance=clearance, depth=depth, force=force)
     check_count("elements", elements)
@@ -100,12 +128,41 @@ def press_fit(
     mu: float = 0.15,
     elements: int = 16,
 ) -> Scene:
-    """A hollow shaft pressed into a hub whose hole is too narrow by `interference` on the radius.
+    """A hollow shaft pressed into a hub whose hole is too narrow.
 
-    kind  'plane-strain', a quarter of the section; or 'axisymmetric', a slice `depth` high between two frictionless
-          planes. Lame's pressure is exact in both as the interference goes to zero.
-    The shaft is larger than `radius` by half of the interference, the hole smaller by the other half.
-    Sizes in mm; elements along the quarter of the circle, or along the height.
+    The shaft is larger than `radius` by half of the interference, and the hole is smaller by the other half. Lame's
+    pressure is exact as the interference goes to zero. Lengths are in mm and Young's moduli in MPa.
+
+    Parameters
+    ----------
+    kind
+        'plane-strain' for a quarter of the section; 'axisymmetric' for a slice between two frictionless planes.
+    radius
+        At which shaft and hub meet.
+    bore
+        Inner radius of the shaft.
+    outside
+        Outer radius of the hub.
+    interference
+        Of the radii.
+    depth
+        Length of the fit along its axis.
+    shaft, hub
+        Materials.
+    mu
+        Friction coefficient.
+    elements
+        Number of elements along the quarter of the circle, or along the height.
+
+    Returns
+    -------
+    Scene
+        Named 'press-fit', with Lame's pressure.
+
+    Raises
+    ------
+    InputError
+        If the radii are not in order, a size is not positive, or the kind is unknown.
     """
     exact = lame(interference, bore, radius, outside, shaft, hub)
     check_positive(bore=bore, depth=depth)
@@ -159,12 +216,40 @@ def stack(
     tilt: float = 10.0,
     elements: int = 8,
 ) -> Scene:
-    """Blocks that only rest on each other, the lowest on a rigid floor, all tilted by an angle [degrees]; plane strain.
+    """Blocks that only rest on each other, the lowest one on a rigid floor, all tilted by an angle; plane strain.
 
-    Statics give the resultant of every joint: with W the weight above it, W cos(tilt) across and W sin(tilt) along, through
-    the centre of gravity of what is above. The stack stands as long as tan(tilt) is below mu and below
-    width / (height of the stack). `weight` is that of one block.
-    Sizes in mm, weight in N; elements across half the width.
+    Statics give the resultant of every joint. With W the weight above a joint it is W cos(tilt) across and W
+    sin(tilt) along, through the centre of gravity of what is above. The stack stands as long as tan(tilt) is below mu
+    and below the width over the height of the stack. Lengths are in mm, forces in N and Young's moduli in MPa.
+
+    Parameters
+    ----------
+    blocks
+        Number of blocks.
+    width, height
+        Of each block.
+    depth
+        Length of the blocks along the direction without strain.
+    material
+        Of the blocks.
+    mu
+        Friction coefficient of all joints.
+    weight
+        Of each block.
+    tilt
+        Angle of the floor [degrees].
+    elements
+        Number of elements across half the width.
+
+    Returns
+    -------
+    Scene
+        Named 'stack'.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive, or the stack would slide or fall over.
     """
     check_count("blocks", blocks)
     check_count("elements", elements)
@@ -212,11 +297,40 @@ def arch(
     weight: float = 1000.0,
     elements: int = 8,
 ) -> Scene:
-    """A half circle of stones that only rest on each other, the outermost on rigid ground; plane strain.
+    """A half circle of stones that only rest on each other, the outermost ones on rigid ground; plane strain.
 
-    Every springing bears half of the weight; the thrusts at both balance. Stones of a thickness below .1075 of the mean
-    radius cannot stand at all (Milankovitch 1907, Theorie der Druckkurven, Z. Math. Phys. 55, 1-27). `weight` is that of all stones.
-    Sizes in mm, weight in N; elements across half the thickness.
+    Every springing bears half of the weight, and the thrusts at both springings balance. Stones that are thinner than
+    .1075 of the mean radius cannot stand at all (Milankovitch 1907, Theorie der Druckkurven, Z. Math. Phys. 55,
+    1-27). Lengths are in mm, forces in N and Young's moduli in MPa.
+
+    Parameters
+    ----------
+    stones
+        Number of stones.
+    radius
+        Mean radius of the half circle.
+    thickness
+        Of the stones, along the radius.
+    depth
+        Length of the arch along its axis.
+    material
+        Of the stones.
+    mu
+        Friction coefficient of all joints.
+    weight
+        Of all stones together.
+    elements
+        Number of elements across half the thickness.
+
+    Returns
+    -------
+    Scene
+        Named 'arch'.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive, or the stones are too thin to stand.
     """
     check_count("stones", stones)
     check_count("elements", elements)

@@ -54,6 +54,7 @@ method = "auto"
 tol = 1e-8
 # accuracy = 0.01               # refine plane meshes until the quantity is known to this relative error
 # quantity = "pressure"
+# adaptive = true               # only where the quantity needs it
 """
 
 

@@ -39,11 +39,44 @@ def flat_punch(
     rigid: str | None = None,
     bilateral: bool = False,
 ) -> Scene:
-    """A block pressed on a foundation by a rigid plate glued to its top; the foundation is clamped below.
+    """A block pressed on a foundation by a rigid plate glued to its top. The foundation is clamped below.
 
-    dim        2: plane strain, half model, `depth` thick.  3: square block on a square foundation, quarter model
-    rigid      None, 'punch' or 'foundation': that body is rigid
-    sizes in mm, force in N on the whole block; elements across the contact half-width
+    Lengths are in mm, forces in N and Young's moduli in MPa.
+
+    Parameters
+    ----------
+    dim
+        2 for plane strain, of which half is modelled; 3 for a square block on a square foundation, of which a quarter
+        is modelled.
+    width, height
+        Of the block.
+    foundation_width, foundation_height
+        Of the foundation.
+    depth
+        Length of both bodies along the direction without strain, in plane strain.
+    upper, lower
+        Materials of the block and of the foundation.
+    mu
+        Friction coefficient.
+    force
+        Total force on the plate, positive in compression.
+    elements
+        Number of elements across the contact half-width.
+    rigid
+        None, 'punch' or 'foundation': that body is rigid.
+    bilateral
+        Whether contact cannot open.
+
+    Returns
+    -------
+    Scene
+        Named 'punch-2d' or 'punch-3d'. In plane strain with a rigid punch it carries the frictionless solution for a
+        half-plane.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive, the foundation is narrower than the block, or a choice is unknown.
     """
     if dim not in (2, 3):
         raise InputError(f"dim must be 2 or 3; got {dim!r}.")
@@ -111,15 +144,46 @@ def rigid_punch(
     elements: int = 64,
     bilateral: bool = False,
 ) -> Scene:
-    """A rigid flat punch, strip or disc, pressed on a half-space: Spence's problem where friction acts.
+    """A rigid flat punch, strip or disc, pressed on a half-space. This is Spence's problem where friction acts.
 
-    Under monotone load the solution is self-similar, so one static step from the unloaded state is exact. The
-    half-space is a block clamped below, `foundation` high and wide from the axis: 10,000 half-widths in plane strain,
-    where its size stretches the contact by a strain ~ half_width / foundation, 1,000 radii of a disc (approach .2 % too
-    small). Elements shrink to 1e-3 of the half-width towards the punch's edge, where the tractions are singular, and
-    displacements are quadratic: the stick zone of linear ones, as many unknowns, is three times as far off
-    (reports/accuracy.md).
-    sizes in mm, force in N; elements across the half-width; depth of the strip
+    The solution is self-similar as the load grows, so that one static step from the unloaded state is exact. The
+    half-space is a block that is clamped below. Its elements shrink to 1e-3 of the half-width towards the edge of the
+    punch, where the tractions are singular, and displacements are quadratic. With linear ones and as many unknowns,
+    the stick zone has three times the error (reports/accuracy.md). Lengths are in mm, forces in N and Young's moduli
+    in MPa.
+
+    Parameters
+    ----------
+    kind
+        'plane-strain' for a strip, 'axisymmetric' for a disc.
+    half_width
+        Of the strip, or radius of the disc.
+    foundation
+        Height of the block and its width from the axis. By default 10,000 half-widths in plane strain, where the size
+        stretches the contact by a strain of about half_width / foundation, and 1,000 radii of a disc, which makes the
+        approach .2 % too small.
+    depth
+        Length of the strip.
+    lower
+        Material of the half-space.
+    mu
+        Friction coefficient.
+    force
+        Total force on the punch, positive in compression.
+    elements
+        Number of elements across the half-width.
+    bilateral
+        Whether contact cannot open.
+
+    Returns
+    -------
+    Scene
+        Named 'rigid-punch-2d' or 'rigid-punch-axisymmetric', with the exact solution unless contact is bilateral.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive, the foundation is smaller than two half-widths, or the kind is unknown.
     """
     if kind not in LARGE:
         raise InputError(f"kind must be one of {', '.join(LARGE)}; got {kind!r}.")

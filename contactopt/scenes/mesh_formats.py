@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import InputError
+from contactopt.scenes.msh4 import read_msh4, version
 
 MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
 # arrays of integers per element whose numbers are groups; those of others are named 'array=number'
@@ -118,6 +119,13 @@ def _read(path: Path) -> Any:
             f"mesh file '{path}': its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp (Abaqus, CalculiX), ..."
         )
     said = ""
+    stated = version(path) if "gmsh" in formats else None
+    if stated is not None and stated.partition(".")[0] not in ("2", "4"):
+        raise InputError(f"mesh file '{path}' is of version {stated} of Gmsh's format; save it in version 4.1 or 2.2.")
+    for newer in (False, True):  # "4" stands for either
+        if stated in (("4", "4.1") if newer else ("4", "4.0")):
+            with contextlib.suppress(Exception):  # what is wrong with a damaged file is said below
+                return read_msh4(path, newer)
     for name in sorted(formats, key=lambda name: name not in SAFE):
         printed = io.StringIO()
         try:  # on a damaged file readers raise anything, print what is wrong, and end the process
@@ -128,7 +136,7 @@ def _read(path: Path) -> Any:
             said = said or " ".join(text.split())[:200] or type(error).__name__
     raise InputError(
         f"mesh file '{path}' cannot be read as {' or '.join(formats)} ({said}); it is damaged or of another "
-        "format" + ("; save Gmsh files in version 4.1 or 2.2." if "gmsh" in formats else ".")
+        "format" + ("; save Gmsh files as text in version 4.1 or 2.2." if "gmsh" in formats else ".")
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
 from skfem import MeshHex, MeshQuad, MeshTet, MeshTri
 
 from contactopt.errors import InputError
@@ -17,6 +16,8 @@ def graded(length: float, first: float, growth: float) -> np.ndarray:
     The number of cells is the smallest that keeps the ratio; the ratio is then lowered so that the first cell is
     exactly `first`. A grid that would need one cell or less is a single cell.
     """
+    from scipy.optimize import brentq
+
     if first >= length:
         return np.array([0.0, length])
     cells = int(np.ceil(np.log1p(length * (growth - 1) / first) / np.log(growth) - 1e-9))

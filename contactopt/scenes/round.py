@@ -32,8 +32,37 @@ def sphere(
 ) -> Scene:
     """A half sphere pressed on a foundation by a rigid plate glued to its flat face; axisymmetric.
 
-    rigid  None, 'sphere' or 'foundation': that body is rigid
-    Sizes in mm, force in N; elements across the contact half-width. The zone loop starts wider than Hertz.
+    Lengths are in mm, forces in N and Young's moduli in MPa. The first contact zone is wider than that of Hertz, and
+    the zone loop (contactopt.analysis.zone) finds its edge.
+
+    Parameters
+    ----------
+    radius
+        Of the sphere.
+    foundation_radius, foundation_height
+        Of the cylinder on which it is pressed, which is clamped below.
+    upper, lower
+        Materials of the sphere and of the foundation.
+    mu
+        Friction coefficient.
+    force
+        Total force on the plate, positive in compression.
+    elements
+        Number of elements across the contact radius.
+    rigid
+        None, 'sphere' or 'foundation': that body is rigid.
+    bilateral
+        Whether contact cannot open.
+
+    Returns
+    -------
+    Scene
+        Named 'sphere', with Hertz's solution for half-spaces.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive, the contact would be too wide for the bodies, or `rigid` names no body.
     """
     check_positive(radius=radius, foundation_radius=foundation_radius, foundation_height=foundation_height, force=force)
     hertz = hertz_point(force, radius, _modulus("sphere", rigid, upper, lower))
@@ -67,10 +96,42 @@ def cylinder(
     rigid: str | None = None,
     bilateral: bool = False,
 ) -> Scene:
-    """A half cylinder, `depth` long, pressed on a foundation by a rigid plate glued to its flat face; plane strain.
+    """A half cylinder pressed on a foundation by a rigid plate glued to its flat face; plane strain, of which half is
+    modelled.
 
-    rigid  None, 'cylinder' or 'foundation': that body is rigid
-    Half model. Sizes in mm, force in N; elements across the contact half-width. The zone loop starts wider than Hertz.
+    Lengths are in mm, forces in N and Young's moduli in MPa. The first contact zone is wider than that of Hertz, and
+    the zone loop (contactopt.analysis.zone) finds its edge.
+
+    Parameters
+    ----------
+    radius
+        Of the cylinder.
+    foundation_width, foundation_height
+        Of the foundation, which is clamped below.
+    depth
+        Length of the cylinder along its axis.
+    upper, lower
+        Materials of the cylinder and of the foundation.
+    mu
+        Friction coefficient.
+    force
+        Total force on the plate, positive in compression.
+    elements
+        Number of elements across the contact half-width.
+    rigid
+        None, 'cylinder' or 'foundation': that body is rigid.
+    bilateral
+        Whether contact cannot open.
+
+    Returns
+    -------
+    Scene
+        Named 'cylinder-2d', with Hertz's solution for half-planes.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive, the contact would be too wide for the bodies, or `rigid` names no body.
     """
     check_positive(
         radius=radius, foundation_width=foundation_width, foundation_height=foundation_height, depth=depth, force=force
@@ -104,11 +165,36 @@ def indentation(
 ) -> Scene:
     """A rigid sphere pressed on a half-space, the most dissimilar pair of bodies; axisymmetric.
 
-    With friction the answer depends on the path: points that come into contact stick with the slip they brought along,
-    so that one step from zero is wrong; use growing_indentation(). The sphere is the paraboloid of its curvature. The
-    half-space is a block clamped below, `foundation` high and wide from the axis: 400 contact radii by default, which
-    makes the approach .4 % too small.
-    Sizes in mm, force in N; elements across the contact radius.
+    With friction the answer depends on the path, because points that come into contact stick with the slip that they
+    brought along. One step from zero is wrong then; growing_indentation() makes the path. The sphere is the
+    paraboloid of its curvature, and the half-space is a block that is clamped below. Lengths are in mm, forces in N
+    and Young's moduli in MPa.
+
+    Parameters
+    ----------
+    radius
+        Of the sphere.
+    foundation
+        Height of the block and its width from the axis. By default 400 contact radii, which makes the approach .4 %
+        too small.
+    lower
+        Material of the half-space.
+    mu
+        Friction coefficient.
+    force
+        Total force on the sphere, positive in compression.
+    elements
+        Number of elements across the contact radius.
+
+    Returns
+    -------
+    Scene
+        Named 'hertz-dissimilar', with the exact solution of the whole path.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive.
     """
     check_positive(radius=radius, force=force)
     hertz = hertz_point_friction(force, radius, contact_modulus(lower), mu, dundurs(None, lower)[1])
@@ -135,11 +221,23 @@ def indentation(
 
 
 def growing_indentation(*, steps: int = 100, **changes: object) -> tuple[Scene, ...]:
-    """The states of indentation(**changes) while its force grows from zero so that the radius grows evenly.
+    """The states of indentation() while its force grows from zero so that the contact radius grows evenly.
 
-    All states share the mesh of the last, with elements / steps elements of further contact in each: one serves best,
-    with more the tractions are as uneven as the steps. The stick ratio c/a comes out too small by less than 1 / steps: points
-    stop slipping up to a step early (implicit Euler).
+    All states share the mesh of the last one, with elements / steps elements of further contact in each. One element
+    for each step serves best; with more of them the tractions are as uneven as the steps. The stick ratio c/a comes
+    out too small by less than 1 / steps, because implicit Euler stops the slip of a point up to a step early.
+
+    Parameters
+    ----------
+    steps
+        Number of states.
+    changes
+        Arguments of indentation(), for the last state.
+
+    Returns
+    -------
+    tuple of Scene
+        The states in their order.
     """
     check_count("steps", steps)
     last = indentation(**changes)  # type: ignore[arg-type]

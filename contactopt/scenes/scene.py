@@ -125,7 +125,8 @@ class Part:
 class Rigid:
     """A rigid body: its compliance is zero.
 
-    normal the contact normal, one value per component; None: the normals of the other body's contact boundary
+    normal the contact normal, one value per component; None: the normals of the other body's contact boundary. Where that is
+           curved, a gap that is measured along one direction needs this direction here
     gap    function of the other body's contact nodes, coordinates (dim, k) -> initial gap (k,) along the normal
            [length]; an array of these values, for half-spaces also of the shape of their grid; None means touching everywhere.
     force  None for an obstacle that does not move; otherwise, as in Plate, the total force on it by component.
@@ -177,16 +178,22 @@ class HalfSpace:
             )
         if self.depth is not None:
             check_number(f"the depth of half-space '{self.name}'", self.depth, low=0.0)
+        if not isinstance(self.periodic, (bool, np.bool_)):
+            raise InputError(f"half-space '{self.name}': periodic must be True or False; got {short(self.periodic)}.")
 
     def ticks(self, elements: int, zone: float | None, axes: int) -> tuple[np.ndarray, ...]:
         """Places along each of the axes; InputError unless they are evenly spaced and growing."""
         given = self.points(elements, zone) if callable(self.points) else self.points
+        if not isinstance(given, (tuple, list, np.ndarray)) or len(given) == 0:
+            raise InputError(
+                f"half-space '{self.name}': its points must be given by one row of places per axis; got {short(given)}."
+            )
         rows = (given,) if np.ndim(given[0]) == 0 else tuple(given)
         if len(rows) != axes:
             raise InputError(
                 f"half-space '{self.name}': its points need {axes} rows of places, one per axis; got {len(rows)}."
             )
-        made = tuple(real_array(f"the points of half-space '{self.name}'", row) for row in rows)
+        made = tuple(real_array(f"a row of points of half-space '{self.name}'", row) for row in rows)
         for row in made:
             steps = np.diff(row)
             if row.ndim != 1 or len(row) < 4 or steps.min() <= 0 or np.ptp(steps) > 1e-6 * steps.mean():
@@ -402,7 +409,10 @@ class Scene:
             raise InputError(f"body '{body}': a value is given for each component by its name; got {short(values)}.")
         for component, value in values.items():
             if component not in self.components:
+                others = [kind for kind, names in COMPONENTS.items() if component in names]
+                remedy = f", or give the scene kind={others[-1]!r}" if others else ""
                 raise InputError(
-                    f"body '{body}': there is no component {component!r}; use {', '.join(self.components)}."
+                    f"body '{body}': there is no component {component!r}; use {', '.join(self.components)}, which are those "
+                    f"of kind {self.kind!r}{remedy}."
                 )
             check_number(f"the {component} value of body '{body}'", value, -LARGEST_VALUE, LARGEST_VALUE)

@@ -290,6 +290,7 @@ def _solve(table: Table | None) -> dict[str, Any]:
     if table is None:
         return {}
     found = {key: table.text(key) for key in SOLVE} | {key: table.number(key, low=0.0) for key in ("tol", "accuracy")}
+    found["adaptive"] = table.take("adaptive", bool, "true or false")
     if (found["accuracy"] is None) != (found["quantity"] is None):
         raise table.fail("'accuracy' and 'quantity' belong together: the bound, and the name of what it bounds.")
     table.close()

@@ -41,16 +41,45 @@ def cattaneo(
     shear: float = 40.0,
     elements: int | None = None,
 ) -> Scene:
-    """A cylinder or sphere pressed by `force` on a flat body of the same material, then pushed sideways by `shear`.
+    """A cylinder or sphere pressed on a flat body of the same material, then pushed sideways.
 
-    dim     2: plane strain, `depth` long.  3: half model about the plane y = 0; its default material has nu = 0, for
-            which the tractions of Cattaneo and Mindlin are exact
-    size    height and half-width of each body: 50 contact half-widths, 8 in 3D, which disturbs the tractions less than
-            the mesh does (the shift depends on the size, the energy lost in a cycle does not)
-    The upper body hangs on a plate that carries both loads and does not tilt, the lower is clamped below; their meshes
-    are mirror images but for the round surface, a parabola, so that normal and tangential loads hardly disturb each
-    other. Put on at once, the loads give the same answer as one after the other, because slip never turns back;
-    unloading needs a path: shear_cycle(). Sizes in mm, forces in N; elements across the half-width.
+    The upper body hangs on a plate that carries both loads and does not tilt, and the lower one is clamped below.
+    Their meshes are mirror images but for the round surface, a parabola, so that normal and tangential loads hardly
+    disturb each other. Put on at once, the loads give the same answer as one after the other, because slip never
+    turns back. Unloading needs a path: shear_cycle(). Lengths are in mm, forces in N and Young's moduli in MPa.
+
+    Parameters
+    ----------
+    dim
+        2 for plane strain; 3 for a sphere, of which the half with y >= 0 is modelled.
+    radius
+        Of the round body. By default it is so large that the contact is small.
+    size
+        Height and half-width of each body. By default 50 contact half-widths, or 8 in 3D, which disturbs the
+        tractions less than the mesh does. The shift depends on the size; the energy lost in a cycle does not.
+    depth
+        Length of the cylinder along its axis.
+    material
+        Of both bodies. In 3D it has nu = 0 by default, for which the tractions of Cattaneo and Mindlin are exact.
+    mu
+        Friction coefficient.
+    force
+        Total normal force, positive in compression.
+    shear
+        Total tangential force.
+    elements
+        Number of elements across the contact half-width.
+
+    Returns
+    -------
+    Scene
+        Named 'cattaneo-2d' or 'cattaneo-3d', with the solution of Cattaneo and Mindlin.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive, the contact would be too wide for the bodies, or the shear is beyond the friction
+        bound.
     """
     if dim not in (2, 3):
         raise InputError(f"dim must be 2 or 3; got {dim!r}.")
@@ -123,9 +152,22 @@ def cattaneo(
 
 
 def shear_cycle(dim: int = 2, *, steps: int = 8, **changes: object) -> tuple[Scene, ...]:
-    """The states of cattaneo(dim, **changes): normal force, shear from zero to its value, to its negative and back.
+    """The states of cattaneo() under a cycle of shear: the normal force alone, shear up to its value, to the negative
+    of it, and back.
 
-    steps from zero to the largest shear; five times as many, and one, in all
+    Parameters
+    ----------
+    dim
+        2 or 3, as for cattaneo().
+    steps
+        Number of states from zero to the largest shear. The whole path has 5 steps + 1 states.
+    changes
+        Arguments of cattaneo().
+
+    Returns
+    -------
+    tuple of Scene
+        The states in their order.
     """
     check_count("steps", steps)
     scene = cattaneo(dim, **changes)  # type: ignore[arg-type]

@@ -56,6 +56,11 @@ def self_affine(
     Source: Persson et al. (2005), On the nature of surface roughness with application to contact mechanics, J. Phys.: Condens.
     Matter 17, R1-R62.
     """
+    for name, pair in (("points", points), ("lengths", lengths)):
+        if np.shape(pair) != (2,):
+            raise InputError(f"{name} must be two numbers, along x and y; got {pair!r}.")
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise InputError(f"the seed must be a whole number of at least 0; got {seed!r}.")
     for name, value in (("the number of points along x", points[0]), ("the number of points along y", points[1])):
         check_count(name, value)
     check_positive(**{"length along x": lengths[0], "length along y": lengths[1], "slope": slope})

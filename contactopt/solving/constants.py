@@ -17,6 +17,7 @@ LEAST_ALPHA = 1e-4  # weight with which it begins there
 POLISH = 10  # proximal steps for the last digits, each so many of which must halve the residual
 ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
 SPARSE_ROUND = 100  # of the first of a sparse Q, where random forces lead nowhere
+PATHS = 3  # interior-point paths drawn at random before each proximal loop of a sparse Q
 GENTLE_ALPHA = 0.1  # weight with which the gentle loop begins
 LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 

@@ -156,14 +156,14 @@ def distance(v, w):
     return w.touches * (w.x[0] ** 2 / 20) * (pressure(v) - gamma * v[1])
 
 
-touches, fixed = np.ones(edge.global_coordinates().value.shape[1:]), consistency.assemble(edge)
+touches, fixed = np.ones(edge.dx.shape), consistency.assemble(edge)
 step = 0
 while step < 30:
     step += 1
     system = K + fixed + bracket.assemble(edge, touches=touches)
     nitsche = solve_linear(*condense(system, distance.assemble(edge, touches=touches), x=U_top, D=held))
     field = edge.interpolate(nitsche)
-    value = pressure(field) - gamma * (field[1] + edge.global_coordinates().value[0] ** 2 / 20)
+    value = pressure(field) - gamma * (field[1] + np.asarray(edge.global_coordinates())[0] ** 2 / 20)
     if np.array_equal(value > 0, touches > 0):
         break
     touches = (value > 0).astype(float)
@@ -172,7 +172,7 @@ print(f"Nitsche: {step} steps, the floor carries {carried:.4f} N")
 
 fig, ax = plt.subplots(figsize=(6, 3.4), layout="constrained")
 ax.plot(x[np.argsort(x)], pressed[np.argsort(x)] / (4 / 32), "C0o-", mfc="none", label="multiplier / area of the node")
-middle = edge.global_coordinates().value[0].mean(axis=1)
+middle = np.asarray(edge.global_coordinates())[0].mean(axis=1)
 order = np.argsort(middle)
 ax.plot(middle[order], np.maximum(value, 0).mean(axis=1)[order], "C1.", label="Nitsche's bracket")
 ax.set(xlabel="x [mm]", ylabel="pressure [MPa]")

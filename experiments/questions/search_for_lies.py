@@ -18,13 +18,16 @@ from concurrent.futures import ProcessPoolExecutor  # noqa: E402
 
 import numpy as np  # noqa: E402
 
-from contactopt import InterfaceProblem, solve  # noqa: E402
+from contactopt import InterfaceProblem, Solution, solve  # noqa: E402
 from contactopt.problem.operators import dense  # noqa: E402
 from experiments.questions.coulomb_check import violations  # noqa: E402
 
 METHODS = ("auto", "auto", "newton", "proximal", "nsgs")
 TOL, SLACK = 1e-8, 20.0  # the check's own conditions are combinations of the certificate's
 FORCES = 1e-3  # of the largest, by which the only reactions may be missed (condition of Q up to 1e4)
+SOLVABLE = ("plain", "null_space", "distant", "uneven")  # families whose problems all have solutions
+SCALES = (1e12, 1e-12), (1e-12, 1e12), (1e12, 1e12)  # of forces and lengths
+UNITS_OF = 6  # coprime to the number of methods, so that each of them is tried
 CASES = 10_000
 PROCESSES = 2
 
@@ -125,7 +128,9 @@ def plate(rng, k, d):  # type: ignore[no-untyped-def]
     V[:, np.arange(d), np.arange(d)] = 1.0
     case["q"] *= 0.1
     s = np.concatenate([[-rng.uniform(0.5, 5)], rng.normal(size=d - 1)])
-    return case | {"V": V.reshape(k * d, d), "s": s}
+    # All contacts move with the plate as one, so that their cones add up to the widest of them: it holds the plate or none does.
+    held = np.linalg.norm(s[1:]) <= case["mu"].max() * -s[0]
+    return case | {"V": V.reshape(k * d, d), "s": s, "feasible": bool(held)}
 
 
 FAMILIES = (infeasible, held, plain, null_space, distant, strong_friction, unsymmetric, uneven, plate)
@@ -143,21 +148,46 @@ def make(seed: int) -> tuple[str, dict]:
     return family.__name__, case
 
 
+def answered(case: dict, seed: int, force: float = 1.0, length: float = 1.0):  # type: ignore[no-untyped-def]
+    """The answer of the case's method, and its problem, in other units; None where the load pulls the bodies apart."""
+    Q, q, s = case["Q"] * (length / force), case["q"] * length, case["s"] * force
+    problem = InterfaceProblem(Q, q, case["mu"], case["V"], s)
+    try:
+        return solve(problem, method_of(seed), tol=TOL, max_iterations=100, time_limit=1.0), problem
+    except ValueError:
+        return None, problem
+
+
+def method_of(seed: int) -> str:
+    return METHODS[(seed // len(FAMILIES)) % len(METHODS)]
+
+
+def changed(case: dict, seed: int, answer: Solution) -> str:
+    """What is different in other units, of every UNITS_OF-th case of a family: the status, or an answer that was certified."""
+    if seed // len(FAMILIES) % UNITS_OF or answer.status.label == "time_limit":
+        return ""
+    for force, length in SCALES:
+        other, _ = answered(case, seed, force, length)
+        if other is None or other.status.label == "time_limit":
+            continue
+        if other.status != answer.status:
+            return f"{answer.status} becomes {other.status} with forces times {force:g} and lengths times {length:g}"
+        miss = np.abs(other.reactions / force - answer.reactions).max() / max(np.abs(answer.reactions).max(), 1e-300)
+        if answer.solved and case["only"] is not None and miss > FORCES:
+            return f"the answer changes by {miss:.1e} with forces times {force:g} and lengths times {length:g}"
+    return ""
+
+
 def judge(seed: int) -> tuple[str, str, str]:
     """Family, status, and what is wrong with an answer that is called solved."""
     name, case = make(seed)
-    problem = InterfaceProblem(case["Q"], case["q"], case["mu"], case["V"], case["s"])
-    method = METHODS[(seed // len(FAMILIES)) % len(METHODS)]
-    try:
-        answer = solve(problem, method, tol=TOL, max_iterations=100, time_limit=1.0)
-    except ValueError:  # the load pulls the bodies apart
+    answer, problem = answered(case, seed)
+    if answer is None:
         return name, "refused", ""
-    if (
-        answer.status.label == "infeasible"
-        and case["feasible"] is None
-        and name in ("plain", "null_space", "distant", "uneven")
-    ):
+    if answer.status.label == "infeasible" and (case["feasible"] is True or name in SOLVABLE):
         return name, "infeasible", "called infeasible although a solution exists"
+    if wrong := changed(case, seed, answer):
+        return name, str(answer.status), wrong
     if not answer.solved:
         return name, str(answer.status), ""
     if case["feasible"] is False:
@@ -179,7 +209,9 @@ TEXT = """{cases} random problems (seeds 0 to {last}), families in turn, methods
 to 1e12, certificate {tol:g}, at most 100 iterations or 1 s. A lie is an answer called solved that violates Coulomb's conditions,
 contact by contact (experiments/coulomb_check.py), by more than {slack:g} times the tolerance, that solves a problem made
 without a solution, or that misses the only reactions there are by {forces:g} of the largest; or a problem with a solution
-that is called infeasible.
+that is called infeasible. A plate is held by contacts that move with it as one if and only if |s_t| <= max mu |s_n|, which
+decides for that family whether there is a solution. Every {units}th case of a family is solved again with forces and lengths
+times {scales}; another status, or another answer where only one is right, counts as a lie too.
 
 Lies: {lies}.
 
@@ -202,7 +234,15 @@ def main(cases: int) -> None:
     lies = [(seed, *result) for seed, result in enumerate(results) if result[2]]
     listed = "; ".join(f"seed {seed} ({name}): {wrong}" for seed, name, _, wrong in lies[:20]) or "none"
     text = TEXT.replace("{table}", "TABLE").format(
-        cases=cases, last=cases - 1, methods=", ".join(METHODS), tol=TOL, slack=SLACK, forces=FORCES, lies=listed
+        cases=cases,
+        last=cases - 1,
+        methods=", ".join(METHODS),
+        tol=TOL,
+        slack=SLACK,
+        forces=FORCES,
+        lies=listed,
+        units=UNITS_OF,
+        scales=", ".join(f"({f:g}, {length:g})" for f, length in SCALES),
     )
     write("search_for_lies", "A search for lies", text.replace("TABLE", "{table}"), {"table": rows}, {})
 

@@ -30,6 +30,8 @@ ROOMS = {
     "runner": "One call leads from a scene to its solution, its figures and its files.",
     "benchmark": "Campaigns run methods on problems, each run in a process of its own, and write tables and reports.",
     "figures": "Results are drawn here.",
+    "adaptivity": "Meshes are refined where the quantity asked for needs it.",
+    "derivatives": "Solutions are differentiated here; parameters are fitted to data, profiles and loads are designed.",
     "analysis": "Here stands what is asked of solved scenes: the contact zone, accuracy, load paths, diagnosis.",
     "interface": "Two bodies become one interface problem here, and its solution becomes displacements and stresses.",
     "bodies": "One elastic body: its elements, its stiffness matrix, and the solvers of its linear systems.",

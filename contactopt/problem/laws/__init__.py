@@ -23,12 +23,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import fields, replace
 from importlib import import_module
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from contactopt.checks import real_array
 from contactopt.errors import InputError
+from contactopt.problem.cones import unit
 
 PRESSED = 1e-8  # normal forces below this fraction of the largest are rounding: the contact is open
 BELOW = 1e-6  # a tangential force sticks if it is below its bound by more than this, relative to the bound
@@ -48,6 +49,16 @@ LAWS = {
     "frictionless": ("contactopt.problem.laws.frictionless", "Frictionless", "contact that may open; no friction"),
     "tied": ("contactopt.problem.laws.tied", "Tied", "surfaces glued to each other"),
 }
+
+
+class Kinks(NamedTuple):
+    """Where the map P of a law has no derivative: two masks (k,), of which both hold at the apex of a cone.
+
+    normal      on the edge between open and closed;  tangential  on the edge between stick and slip
+    """
+
+    normal: np.ndarray
+    tangential: np.ndarray
 
 
 class Law:
@@ -127,6 +138,26 @@ class Law:
         """The map P of Newton's equations r = P(r - rho u), and its generalised derivative, at y (k, dim)."""
         return self.nearest_derivative(y, y[:, 0])
 
+    def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
+        """(k, dim) derivative of `project` at the point y (k, dim) by the law's parameter at each contact.
+
+        Raises InputError for a law that does not know it.
+        """
+        raise InputError(f"the law {type(self).__name__} has no derivative by its parameter (project_by_parameter).")
+
+    def kinks(self, y: np.ndarray, distance: float) -> Kinks:
+        """The contacts whose point y (k, dim) lies within a distance [force] of a kink of `project`."""
+        normal = (np.abs(y[:, 0]) <= distance) & ((self.lowest == 0) | self.rough)
+        slack = np.linalg.norm(y[:, 1:], axis=1) - self.bound(y[:, 0])
+        return Kinks(normal, (np.abs(slack) <= distance) & self.rough & (normal | ~self.idle(y)))
+
+    def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
+        """The points y (k, dim) with those of the masks moved onto their kinks."""
+        out = y.copy()
+        out[kinks.normal, 0] = 0.0
+        out[:, 1:] = np.where(kinks.tangential[:, None], unit(y[:, 1:]) * self.bound(out[:, 0])[:, None], y[:, 1:])
+        return out
+
     def idle(self, y: np.ndarray) -> np.ndarray:
         """(k,) mask of points y (k, dim) at which `project` and its derivative are sure to be zero."""
         return np.zeros(len(y), dtype=bool)
@@ -170,6 +201,10 @@ class Law:
     def times(self, factor: float) -> Self:
         """The same law with its friction multiplied by a factor."""
         return self._mapped(lambda parameter: factor * parameter)
+
+    def shifted(self, change: np.ndarray) -> Self:
+        """The same law with its parameter changed by (k,), at least zero."""
+        return self._mapped(lambda parameter: np.maximum(parameter + change, 0.0))
 
     def select(self, contacts: np.ndarray) -> Law:
         """The law of some contacts alone: indices, with repetitions if wanted, or a mask."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative
-from contactopt.problem.laws import Law, Projected
+from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative, split, unit
+from contactopt.problem.laws import Kinks, Law, Projected
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,3 +36,27 @@ class Associated(Law):
 
     def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
         return coulomb_cone_derivative(y, self.mu)
+
+    def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
+        """Between the cone and its polar the nearest point is h (1, mu unit), h = (y_n + mu |y_t|) / (1 + mu^2)."""
+        n, t = split(y)
+        size, mu = np.linalg.norm(t, axis=1), self.mu
+        beside = (mu * size > -n) & (size > mu * n)
+        h = (n + mu * size) / (1 + mu**2)
+        change = (size - 2 * mu * h) / (1 + mu**2)
+        return beside[:, None] * np.concatenate([change[:, None], (h + mu * change)[:, None] * unit(t)], axis=1)
+
+    def kinks(self, y: np.ndarray, distance: float) -> Kinks:
+        """The edge of the polar cone, where contacts open, and that of the cone itself, where they begin to slip."""
+        n, t = split(y)
+        size = np.linalg.norm(t, axis=1)
+        normal = np.abs(n + self.mu * size) <= distance
+        return Kinks(normal, (np.abs(size - self.mu * n) <= distance) & self.rough)
+
+    def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
+        out, size = y.copy(), np.linalg.norm(y[:, 1:], axis=1)
+        out[:, 0] = np.where(kinks.normal, -self.mu * size, y[:, 0])
+        edge = unit(y[:, 1:]) * (self.mu * np.maximum(y[:, 0], 0.0))[:, None]
+        out[:, 1:] = np.where((kinks.tangential & ~kinks.normal)[:, None], edge, y[:, 1:])
+        out[kinks.tangential & kinks.normal] = 0.0
+        return out

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactopt.problem.cones import cylinder_derivative, disc, disc_of_height, split
+from contactopt.problem.cones import cylinder_derivative, disc, disc_of_height, split, unit
 from contactopt.problem.laws import Law, Projected
 
 
@@ -41,3 +41,8 @@ class Bilateral(Law):
         """y_n itself, and y_t projected on the disc of radius mu |y_n|."""
         n, t = split(y)
         return disc_of_height(n, t, self.mu, np.sign(n))
+
+    def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
+        n, t = split(y)
+        slides = np.linalg.norm(t, axis=1) > self.mu * np.abs(n)
+        return np.concatenate([np.zeros((len(y), 1)), (slides * np.abs(n))[:, None] * unit(t)], axis=1)

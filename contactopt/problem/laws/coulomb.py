@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative, disc_of_height, split
+from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative, disc_of_height, split, unit
 from contactopt.problem.laws import Law, Projected
 
 
@@ -46,6 +46,11 @@ class Coulomb(Law):
         P, D = disc_of_height(np.maximum(n, 0.0), t, self.mu, closed.astype(float))
         D[~closed] = 0.0
         return P, D
+
+    def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
+        n, t = split(y)
+        slides = (n > 0) & (np.linalg.norm(t, axis=1) > self.mu * n)
+        return np.concatenate([np.zeros((len(y), 1)), (slides * n)[:, None] * unit(t)], axis=1)
 
     def opening(self, u_t: np.ndarray) -> np.ndarray:
         return np.asarray(self.mu * np.linalg.norm(u_t, axis=1))

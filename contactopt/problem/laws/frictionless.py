@@ -37,6 +37,9 @@ class Frictionless(Law):
         D[:, 0, 0] = y[:, 0] > 0
         return self.nearest(y, r_n), D
 
+    def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
+        return np.zeros(y.shape)
+
     def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
         out = np.zeros(y.shape)
         out[:, 0] = np.maximum(y[:, 0], 0.0)

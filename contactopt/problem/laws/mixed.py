@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.problem.laws import Law, Projected
+from contactopt.problem.laws import Kinks, Law, Projected
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +55,19 @@ class Mixed(Law):
 
     def project(self, y: np.ndarray) -> Projected:
         return self._projected(y, lambda law, own: law.project(y[own]))
+
+    def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
+        return self._gathered(lambda law, own: law.project_by_parameter(y[own]))
+
+    def kinks(self, y: np.ndarray, distance: float) -> Kinks:
+        normal = self._gathered(lambda law, own: law.kinks(y[own], distance).normal)
+        return Kinks(normal, self._gathered(lambda law, own: law.kinks(y[own], distance).tangential))
+
+    def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
+        return self._gathered(lambda law, own: law.on_kinks(y[own], Kinks(*(mask[own] for mask in kinks))))
+
+    def shifted(self, change: np.ndarray) -> Mixed:
+        return replace(self, parts=tuple(law.shifted(change[own]) for law, own in zip(self.parts, self.members)))
 
     def opening(self, u_t: np.ndarray) -> np.ndarray:
         return self._gathered(lambda law, own: law.opening(u_t[own]))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contactopt.problem.cones import cylinder_derivative, disc
+from contactopt.problem.cones import cylinder_derivative, disc, unit
 from contactopt.problem.laws import Law, Projected
 
 
@@ -33,6 +33,10 @@ class Tresca(Law):
 
     def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
         return cylinder_derivative(y, self.limit)
+
+    def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
+        slides = np.linalg.norm(y[:, 1:], axis=1) > self.limit
+        return np.concatenate([np.zeros((len(y), 1)), slides[:, None] * unit(y[:, 1:])], axis=1)
 
     def scaled(self, force: float) -> Tresca:
         return replace(self, limit=self.limit / force)

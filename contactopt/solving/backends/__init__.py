@@ -88,6 +88,7 @@ class Backend:
 
 _CLARABEL = {"tol_gap_abs": TIGHT, "tol_gap_rel": TIGHT, "tol_feas": TIGHT}
 _ECOS = {"abstol": TIGHT, "reltol": TIGHT, "feastol": TIGHT}
+_CVXOPT = {"abstol": TIGHT, "reltol": TIGHT, "feastol": TIGHT}
 _SCS = {"eps_abs": TIGHT, "eps_rel": TIGHT}
 
 QP: dict[str, Backend] = {
@@ -125,7 +126,7 @@ QP: dict[str, Backend] = {
         Backend("piqp", "qp", "piqp", "piqp", {"eps_abs": TIGHT, "eps_rel": TIGHT}),
         Backend("quadprog", "qp", "quadprog", "quadprog"),
         Backend("scs", "qp", "scs", "scs", _SCS | {"max_iters": 200_000}, sparse=True, clock="time_limit_secs"),
-        Backend("cvxopt", "qp", "cvxopt", "cvxopt", {"abstol": TIGHT, "reltol": TIGHT, "feastol": TIGHT}),
+        Backend("cvxopt", "qp", "cvxopt", "cvxopt", _CVXOPT),
         Backend("qpalm", "qp", "qpalm", "qpalm", {"eps_abs": TIGHT, "eps_rel": TIGHT}, sparse=True, clock="time_limit"),
     )
 }
@@ -136,7 +137,7 @@ CONIC: dict[str, Backend] = {
         Backend("clarabel", "conic", "clarabel", "clarabel", _CLARABEL, clock="time_limit"),
         Backend("scs", "conic", "scs", "scs", _SCS | {"max_iters": 200_000}, clock="time_limit_secs"),
         Backend("ecos", "conic", "ecos", "ecos", _ECOS | {"max_iters": 100}, steps="max_iters"),
-        Backend("cvxopt", "conic", "cvxopt", "cvxopt", {"abstol": TIGHT, "reltol": TIGHT, "feastol": TIGHT}),
+        Backend("cvxopt", "conic", "cvxopt", "cvxopt", _CVXOPT | {"max_iters": 100}, steps="max_iters"),
     )
 }
 

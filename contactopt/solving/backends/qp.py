@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.errors import BackendError
 from contactopt.solving.backends import QP, Backend, find
+from contactopt.solving.backends.child import Child
 from contactopt.solving.deadline import TimeUp, check_time
 
 
@@ -23,6 +24,7 @@ class BoxQP:
     backend: Backend
     P: np.ndarray
     A: np.ndarray
+    child: Child = field(default_factory=Child)  # for backends that take no time limit
 
     @classmethod
     def using(cls, name: str, P: np.ndarray, A: np.ndarray) -> BoxQP:
@@ -40,23 +42,27 @@ class BoxQP:
 
         P, A = (sp.csc_matrix(self.P), sp.csc_matrix(self.A)) if self.backend.sparse else (self.P, self.A)
         rows = {"A": A, "b": b} if len(b) else {}
-        problem = qpsolvers.Problem(P, c, lb=_finite_or_none(low), ub=_finite_or_none(high), **rows)
+        arguments = {"P": P, "q": c, "lb": _finite_or_none(low), "ub": _finite_or_none(high), **rows}
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                for settings in self.backend.rounds():
-                    answer = qpsolvers.solve_problem(problem, self.backend.name, initvals=start, **settings)
-                    if answer.found:
-                        break
+                if Child.needed(self.backend, len(c)):
+                    x, y = self.child.solve(arguments, self.backend.name, start, self.backend.timed())
+                else:
+                    problem = qpsolvers.Problem(**arguments)
+                    for settings in self.backend.rounds():
+                        answer = qpsolvers.solve_problem(problem, self.backend.name, initvals=start, **settings)
+                        if answer.found:
+                            break
+                    x, y = answer.x, answer.y
             check_time()
         except TimeUp:
             raise
         except Exception as error:  # any backend may raise anything: it must not end a campaign
             raise BackendError(f"QP backend '{self.backend.name}' failed: {error}") from error
-        x = answer.x
         if x is None or not np.all(np.isfinite(x)):
             raise BackendError(f"QP backend '{self.backend.name}' gave no answer; the problem may be infeasible.")
-        y = answer.y if answer.y is not None and np.size(answer.y) == len(b) else np.zeros(len(b))
+        y = y if y is not None and np.size(y) == len(b) else np.zeros(len(b))
         return np.asarray(x), np.nan_to_num(np.asarray(y, dtype=float))
 
 

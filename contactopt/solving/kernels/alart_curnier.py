@@ -23,6 +23,9 @@ from contactopt.solving.kernels.semismooth import RIDGE, Equations
 FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-4  # accuracy of an iterative step: the first, and the bounds of the others
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
 
+LEAST_REACH = 1e-12  # of a multiplier's column of V, which is dimensionless
+HELD = 1e-8  # share of its motion that the glued contacts must feel of every multiplier
+
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
 # equations, error, balance, D, relative accuracy -> dr, dlambda or None
 Step = Callable[[Equations, np.ndarray, np.ndarray, np.ndarray, float], Iterate | None]
@@ -154,8 +157,34 @@ def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
 
 
 def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
-    """Mask (k,) of the contacts that the bonded solution glues: all if a plate presses, else those that would penetrate."""
-    return np.asarray((problem.law.lowest < 0) | (len(problem.s) > 0) | (problem.q[:, 0] < 0))
+    """Mask (k,) of the contacts that the bonded solution glues.
+
+    Where loads press free bodies together these are all contacts that the loads may close, and otherwise those that would
+    penetrate. One contact i that bears the load F of a pair alone closes once the bodies have approached by q_i + Q_ii F.
+    Further contacts only stiffen the pair. So no contact closes whose gap exceeds the least of these approaches, unless a body turns.
+    All are glued where the near ones alone would leave a motion free.
+    """
+    gap = problem.q[:, 0]
+    closed = np.asarray((problem.law.lowest < 0) | (gap < 0))
+    if not len(problem.s):
+        return closed
+    force = float(np.sum(np.abs(problem.s) / np.maximum(np.abs(problem.V).max(axis=0, initial=0.0), LEAST_REACH)))
+    indented = gap + diagonal(problem.Q).reshape(problem.q.shape)[:, 0] * force
+    for first, last in [(pair.start, pair.stop) for pair in problem.pairs] or [(0, problem.contacts)]:
+        own = slice(first, last)
+        closed[own] |= gap[own] <= indented[own].min(initial=np.inf)
+    return closed if closed.all() or _determined(problem, closed) else np.ones(problem.contacts, dtype=bool)
+
+
+def _determined(problem: InterfaceProblem, closed: np.ndarray) -> bool:
+    """Whether the glued contacts hold every motion that all of them hold."""
+    V = sp.csr_array(problem.V)
+    near = V[np.repeat(closed, problem.dim)]
+    whole, held = (V.T @ V).toarray(), (near.T @ near).toarray()
+    try:
+        return bool(la.eigh(held, whole, eigvals_only=True, subset_by_index=[0, 0])[0] > HELD)
+    except la.LinAlgError:
+        return False
 
 
 def glued_projection(equations: Equations, glued: np.ndarray) -> Equations:

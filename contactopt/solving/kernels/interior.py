@@ -15,6 +15,7 @@ interior point algorithm; Nesterov, Todd (1997); Mehrotra (1992) for the correct
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -31,17 +32,39 @@ BOUNDARY, SHORT = 0.98, 0.9  # of the way to the boundary of the cones
 STALLED = 12  # iterations without progress
 RIDGE = 1e-10
 START = 100.0  # size of the first point in both cones, over dimensionless forces of order one
+SMOOTHING = 0.03, 0.3  # least and largest smoothing of random paths
 STUCK = 0.3  # a step shorter than this is no Newton step; the next one leaves |u_t| as it is
 
 Iterate = tuple[np.ndarray, np.ndarray]
 
 
-def interior_iterates(problem: InterfaceProblem, matrix: Blocks, full: bool = False) -> Iterator[tuple[Iterate, float]]:
-    """Points (r (k, dim), lambda (p,)) in the cones, of a dimensionless problem, and how far each is from a solution.
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Which path to a solution is followed. On jammed packings many paths end early, and another one does not.
 
-    full  |u_t| is linearised in every step, with shorter steps; else not after a step that had to be short. Either way
-          solves problems that the other does not.
+    full    |u_t| is linearised in every step, with shorter steps; else not after a step that had to be short
+    smooth  |u_t| is replaced by (|u_t|^2 + (smooth z_n)^2)^1/2, which has no kink where a contact begins to slip the other way;
+            its derivative by z_n is left out. The end of the path is a solution but for terms of order smooth^2
+    first   r_n mu and z_n / mu of the first point, (2,) or one for every contact, (2, k)
     """
+
+    full: bool = True
+    smooth: float = 0.0
+    first: np.ndarray = field(default_factory=lambda: np.full((2, 1), START))
+
+    @classmethod
+    def random(cls, rng: np.random.Generator, contacts: int) -> Path:
+        """A path drawn at random."""
+        size = START ** rng.uniform() * np.exp(rng.normal(size=(2, contacts)))
+        return cls(smooth=float(np.exp(rng.uniform(*np.log(SMOOTHING)))), first=size)
+
+
+def interior_iterates(
+    problem: InterfaceProblem, matrix: Blocks, path: Path | None = None
+) -> Iterator[tuple[Iterate, float]]:
+    """Points (r (k, dim), lambda (p,)) in the cones, of a dimensionless problem, and how far each is from a solution."""
+    path = path or Path()
+    full = path.full
     k, d = problem.q.shape
     mu = np.where(problem.mu < SMOOTH, 1.0, np.minimum(problem.mu, ROUGH))
     smooth = problem.mu < SMOOTH
@@ -51,10 +74,10 @@ def interior_iterates(problem: InterfaceProblem, matrix: Blocks, full: bool = Fa
     kept[smooth, 1:] = False
     flat, V, p = kept.ravel(), problem.V, len(problem.s)
     x, z, lam = np.zeros((k, d)), np.zeros((k, d)), np.zeros(p)
-    x[:, 0] = z[:, 0] = START
+    x[:, 0], z[:, 0] = path.first
     best, since, last = np.inf, 0, 1.0
     for _ in range(ITERATIONS):
-        slip = np.sqrt(np.sum(z[:, 1:] ** 2, axis=1) + 1e-20)
+        slip = np.sqrt(np.sum(z[:, 1:] ** 2, axis=1) + (path.smooth * z[:, 0]) ** 2 + 1e-20)
         r = scale * x
         gap = scale * ((matrix.Q @ r.ravel() + V @ lam).reshape(k, d) + problem.q) - z
         gap[:, 0] += np.where(smooth, 0.0, slip)

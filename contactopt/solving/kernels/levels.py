@@ -27,6 +27,7 @@ from contactopt.solving.deadline import check_time
 RESTART, CYCLES = 40, 3  # of GMRES
 ITERATIONS = 100  # of PCG
 COARSEST = 12  # contacts a side
+FIRST, RATIO = 0.5, 32.0  # of the shifts of `shift_shares`: where they begin to grow, and by how much
 
 Point = tuple[np.ndarray, np.ndarray]  # reactions (c, k), multipliers (p,)
 
@@ -153,9 +154,18 @@ class Level:
 
     @cached_property
     def inverse(self) -> dict[tuple[int, int], np.ndarray]:
-        """Symbols of an approximate inverse of Q on the grid without padding, for the normal and the tangential components.
+        """Symbols of an approximate inverse of Q, without the coupling of normal and tangential components."""
+        return self.inverse_symbols(self.components[:1]) | self.inverse_symbols(self.components[1:])
 
-        The coupling of both is left out. The symbol on the smaller grid is that of the kernel that repeats itself there.
+    @cached_property
+    def largest(self) -> float:
+        """The largest value of the symbol of Q [length / force]."""
+        return float(max(self.kernel.symbols[a, a].max() for a in self.components))
+
+    def inverse_symbols(self, components: tuple[int, ...], shift: float = 0.0) -> dict[tuple[int, int], np.ndarray]:
+        """Symbols of an approximate inverse of Q + shift on the grid without padding, for (0,), (1,) or (1, 2).
+
+        The symbol on the smaller grid is that of the kernel that repeats itself there.
         """
         symbols = self.kernel.symbols
         every = (slice(None, None, 1 if self.periodic else 2),) * len(self.kernel.grid)
@@ -165,24 +175,27 @@ class Level:
             low = symbol.ravel()[1:].min() if self.periodic else 0.0
             if self.periodic:
                 symbol.flat[0] = 2 * symbol.max()
-            return np.maximum(symbol, max(low, 1e-3 * float(np.median(symbol))))
+            return np.maximum(symbol, max(low, 1e-3 * float(np.median(symbol)))) + shift
 
-        out = {}
-        if 0 in self.components:
-            out[0, 0] = 1 / positive(symbols[0, 0])
-        if 1 in self.components:
-            first = positive(symbols[1, 1])
-            if 2 in self.components:
-                second, mixed = positive(symbols[2, 2]), symbols[1, 2][every] if (1, 2) in symbols else 0.0 * first
-                determinant = np.maximum(first * second - mixed**2, 0.1 * first * second)
-                out[1, 1], out[2, 2], out[1, 2] = second / determinant, first / determinant, -mixed / determinant
-            else:
-                out[1, 1] = 1 / first
-        return {pair: symbol.astype(np.float32) for pair, symbol in out.items()}
+        if not components:
+            return {}
+        first = positive(symbols[components[0], components[0]])
+        if len(components) == 1:
+            return {(components[0], components[0]): (1 / first).astype(np.float32)}
+        second, mixed = positive(symbols[2, 2]), symbols[1, 2][every] if (1, 2) in symbols else 0.0 * first
+        determinant = np.maximum(first * second - mixed**2, 0.1 * first * second)
+        inverse = {(1, 1): second / determinant, (2, 2): first / determinant, (1, 2): -mixed / determinant}
+        return {pair: symbol.astype(np.float32) for pair, symbol in inverse.items()}
 
-    def rough_solve(self, x: np.ndarray, closed: np.ndarray, components: tuple[int, ...]) -> np.ndarray:
-        """The approximate inverse of Q on the closed contacts, x (components, m) -> (components, m)."""
-        grid = self.kernel.grid
+    def rough_solve(
+        self,
+        x: np.ndarray,
+        closed: np.ndarray,
+        components: tuple[int, ...],
+        symbols: dict[tuple[int, int], np.ndarray] | None = None,
+    ) -> np.ndarray:
+        """An approximate inverse on the closed contacts, x (components, m) -> (components, m); by default that of Q."""
+        inverse, grid = self.inverse if symbols is None else symbols, self.kernel.grid
         padded = grid if self.periodic else tuple(m // 2 for m in self.kernel.padded)
         spectra = []
         for part in x:
@@ -192,9 +205,9 @@ class Level:
         out = np.empty(x.shape, np.float32)
         for i, a in enumerate(components):
             total = sum(
-                self.inverse[min(a, b), max(a, b)] * spectrum
+                inverse[min(a, b), max(a, b)] * spectrum
                 for b, spectrum in zip(components, spectra)
-                if (min(a, b), max(a, b)) in self.inverse
+                if (min(a, b), max(a, b)) in inverse
             )
             out[i] = backward(total, padded, grid).ravel()[closed]
         return out
@@ -320,25 +333,40 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
     """An approximate inverse of the system of `_unsymmetric`: first the normal forces, then those that hold or slip.
 
     With the derivative [[1, 0], [D_tn, D_tt]] of a contact, its tangential row is
-    (I - D_tt) dr_t + D_tt rho w_t = right + D_tn (dr_n - rho w_n). The square roots of D_tt weight what is held.
+    (I - D_tt) dr_t + D_tt rho w_t = right + D_tn (dr_n - rho w_n). For an eigenvalue d > 0 of D_tt it is
+
+        (sigma + rho Q) dr = right / d,   sigma = (1 - d) / d,
+
+    where sigma is zero for contacts that stick and grows with the slip, without bound on ever finer grids. The symbol
+    of Q is inverted for a few shifts sigma, and each contact takes part in the two next to its own, in shares that sum
+    to one. Beyond the last shift rho Q hardly matters.
     """
     c, m = V.shape[:2]
     D, rho, tangential = at.D, level.rho, level.components[1:]
     values, vectors = np.linalg.eigh(D[:, 1:, 1:])
-    values = np.clip(values, 0.0, 1.0)
-    held = values > 1e-8
-    root = np.einsum("kab,kb,kcb->kac", vectors, np.sqrt(values), vectors)
-    back = np.einsum("kab,kb,kcb->kac", vectors, held / np.sqrt(np.where(held, values, 1.0)), vectors)
-    free = np.einsum("kab,kb,kcb->kac", vectors, (~held).astype(float), vectors)
+    values = np.clip(values, 1e-12, 1.0)
     pressed = D[:, 0, 0] > 0
+    shifts, shares = shift_shares((1 - values) / values, rho * level.largest)
+
+    def turned(weights: np.ndarray) -> np.ndarray:
+        return np.einsum("kab,kb,kcb->kac", vectors, weights, vectors)
+
+    parts_of = [
+        (turned(np.sqrt(share)), turned(np.sqrt(share) / values), level.inverse_symbols(tangential, shift / rho))
+        for shift, share in zip(shifts, shares)
+        if share.any()
+    ]
+    free = turned(np.asarray(1 - sum(shares)))
 
     def apply(x: np.ndarray) -> np.ndarray:
         parts = x.reshape(c, m)
         out = np.empty((c, m))
         out[:1] = np.where(pressed, level.rough_solve(parts[:1] * pressed / rho, at.closed, (0,)), parts[:1])
         right = parts[1:] + np.einsum("ka,k->ak", D[:, 1:, 0], out[0] - parts[0])
-        inner = level.rough_solve(np.einsum("kab,bk->ak", back, right) / rho, at.closed, tangential)
-        out[1:] = np.einsum("kab,bk->ak", free, right) + np.einsum("kab,bk->ak", root, inner)
+        out[1:] = np.einsum("kab,bk->ak", free, right)
+        for back, forth, symbols in parts_of:
+            inner = level.rough_solve(np.einsum("kab,bk->ak", forth, right) / rho, at.closed, tangential, symbols)
+            out[1:] += np.einsum("kab,bk->ak", back, inner)
         return out.ravel()
 
     W = V.reshape(c * m, -1)
@@ -353,3 +381,14 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
         return np.concatenate([y - Y @ lam, lam])
 
     return solve
+
+
+def shift_shares(sigma: np.ndarray, largest: float) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Shifts from 0 to beyond `largest`, and the share (k, j) that each sigma (k, j) has in each of them.
+
+    The shares are hat functions of log(FIRST + sigma); those of sigma beyond the last shift sum to less than one.
+    """
+    count = int(np.ceil(np.log(1 + largest / FIRST) / np.log(RATIO)))
+    place = np.log1p(sigma / FIRST) / np.log(RATIO)
+    shares = [np.maximum(0.0, 1 - np.abs(place - j)) for j in range(count + 1)]
+    return FIRST * (RATIO ** np.arange(count + 1) - 1.0), shares

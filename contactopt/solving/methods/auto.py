@@ -7,8 +7,10 @@
    and a few steps of the proximal loop for the last digits. They need no symmetric Q and no backend.
 3. Where these fail and Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point, convex programs.
    Where that fails too, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
-4. The proximal loop from the best of these points, its weight falling slowly: jammed packings need hundreds of steps.
-5. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
+4. Where Q is sparse: interior-point paths drawn at random, PATHS of them, since one that ends early says nothing of the next;
+   then the proximal loop from the best of all points, its weight falling slowly: jammed packings need hundreds of steps.
+   When SPARSE_ROUND of them have not halved the residual, the same again, with twice the patience.
+5. Else the proximal loop from the best point. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
    contact forces drawn at random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
    friction may have solutions that repel the loop and others that attract it.
 It ends where the driver's certificate or limits say so. There is no proof that it finds a solution: Coulomb's problem
@@ -37,6 +39,7 @@ from contactopt.solving.constants import (
     LARGER,
     LEAST_ALPHA,
     NEWTON_STEPS,
+    PATHS,
     PATIENCE,
     POLISH,
     PROGRESS,
@@ -44,11 +47,9 @@ from contactopt.solving.constants import (
     SPARSE_ROUND,
 )
 from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations, definite
-from contactopt.solving.kernels.interior import interior_iterates
+from contactopt.solving.kernels.interior import Path, interior_iterates
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.solving.methods import NATIVE, Iterate, Known
-from contactopt.solving.methods.cone import AcaryCadoux
-from contactopt.solving.methods.nested import Nested
 from contactopt.solving.methods.newton import Newton
 from contactopt.solving.methods.proximal import Proximal, proximal_equations, proximal_iterates
 from contactopt.solving.notes import note
@@ -87,24 +88,24 @@ class Auto:
             except InputError as error:
                 note(logger, f"the default method ends with Newton's steps: {error}")
                 return
+        from contactopt.solving.methods.cone import AcaryCadoux
+
         matrix = block_matrix(problem.Q, problem.dim)
         if start is not None and sp.issparse(problem.Q):
             reached = yield from self._proximal(problem, matrix, start, POLISH, LEAST_ALPHA)
         if AcaryCadoux().solves(problem.law) and not problem.law.dilatant:
             for full in (True, False):
-                reached = yield from self._interior(problem, matrix, reached, full)
+                reached = yield from self._interior(problem, matrix, reached, Path(full))
             if problem.symmetric and not sp.issparse(problem.Q):
                 reached = yield from self._cones(problem, reached)
         if infeasibility(problem) is not None:  # the driver says so
             return
+        if sp.issparse(problem.Q):
+            yield from self._jammed(problem, matrix, reached)
+            return
         random = np.random.default_rng(0)
         for restarts in count():
-            if sp.issparse(problem.Q):
-                last = yield from self._proximal(
-                    problem, matrix, reached, SPARSE_ROUND * 2**restarts, GENTLE_ALPHA, gentle=True
-                )
-            else:
-                last = yield from self._proximal(problem, matrix, reached, ROUND * 2**restarts, Proximal.alpha)
+            last = yield from self._proximal(problem, matrix, reached, ROUND * 2**restarts, Proximal.alpha)
             r = random.normal(size=problem.q.shape)
             r[:, 0] = np.abs(r[:, 0])
             r *= LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
@@ -112,8 +113,26 @@ class Auto:
             note(logger, "the proximal loop got nowhere and started again from random forces")
 
     @staticmethod
+    def _jammed(problem: InterfaceProblem, matrix: Blocks, reached: Iterate) -> Generator[Iterate, None, None]:
+        """Without end: interior-point paths drawn at random, and the gentle proximal loop from the best point so far."""
+        from contactopt.solving.methods.cone import AcaryCadoux
+
+        random, evaluate = np.random.default_rng(0), proximal_equations(problem, matrix).evaluate
+        interior = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
+        for restarts in count():
+            for _ in range(PATHS if interior else 0):
+                path = Path.random(random, problem.contacts)
+                reached = yield from Auto._interior(problem, matrix, reached, path)
+            patience = SPARSE_ROUND * 2**restarts
+            last = yield from Auto._proximal(problem, matrix, reached, patience, GENTLE_ALPHA, gentle=True)
+            reached = min(reached, last, key=lambda point: evaluate(*point)[0])
+            note(logger, "the proximal loop got nowhere and goes on from the best point, by other paths to begin with")
+
+    @staticmethod
     def _nested(problem: InterfaceProblem, start: Iterate | None) -> Generator[Iterate, None, Iterate | None]:
         """Iterates of the nested method while they change for the better; returns the best."""
+        from contactopt.solving.methods.nested import Nested
+
         best, reached, since = np.inf, start, 0
         for point, residual in Nested().steps(problem, start):
             yield point
@@ -144,6 +163,8 @@ class Auto:
     @staticmethod
     def _cones(problem: InterfaceProblem, start: Iterate) -> Generator[Iterate, None, Iterate]:
         """A few cone programs; returns the best point, `start` if there was none better."""
+        from contactopt.solving.methods.cone import AcaryCadoux
+
         if not AcaryCadoux().solves(problem.law):
             return start
         equations = coulomb_equations(problem)
@@ -159,14 +180,14 @@ class Auto:
 
     @staticmethod
     def _interior(
-        problem: InterfaceProblem, matrix: Blocks, start: Iterate, full: bool
+        problem: InterfaceProblem, matrix: Blocks, start: Iterate, path: Path
     ) -> Generator[Iterate, None, Iterate]:
         """The interior-point method and, where it came near to a solution, a few proximal steps for the last digits.
 
         Returns the last point or a better `start`.
         """
         best, reached = np.inf, start
-        for point, error in interior_iterates(problem, matrix, full):
+        for point, error in interior_iterates(problem, matrix, path):
             yield point
             if error < best:
                 best, reached = error, point

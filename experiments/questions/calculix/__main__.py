@@ -18,6 +18,7 @@ from typing import Any  # noqa: E402
 import numpy as np  # noqa: E402
 
 from contactopt import solve  # noqa: E402
+from contactopt.figures.style import BLUE, GREEN, ORANGE  # noqa: E402
 from contactopt.interface.recovery import recover  # noqa: E402
 from contactopt.interface.reduction import reduce_bodies  # noqa: E402
 from experiments.questions.calculix.deck import LEAST  # noqa: E402
@@ -215,7 +216,7 @@ def figure(bench: Bench, sweep: list[dict[str, Any]]) -> Any:
     for i, (component, line) in enumerate((("normal", "-"), ("tangential", "--"))):
         error = [difference(r[:, i], bench.exact.reactions[:, i])[1] for r in own]
         axes[0].loglog(factors, error, line, color="0.6", label=f"{component}, same law in contactopt", zorder=0)
-    for law, colour in zip(DECADES, ("C0", "C1")):
+    for law, colour in zip(DECADES, (BLUE, ORANGE)):
         good = converged(sweep, law)
         lost = [row for row in sweep if row["contact"] == law and row["end"] != "converged"]
         for component, style in (("normal", {"marker": "o"}), ("tangential", {"marker": "s", "mfc": "none"})):
@@ -228,7 +229,7 @@ def figure(bench: Bench, sweep: list[dict[str, Any]]) -> Any:
                     axis.loglog(*zip(*points), ls="", marker=marker, color=colour, label=label)
     for row in converged(sweep, "mortar"):
         for axis, key in zip(axes, ("normal, L2", "iterations", "seconds")):
-            axis.axhline(row[key], color="C2", ls=":", label="normal, mortar" if axis is axes[0] else "mortar")
+            axis.axhline(row[key], color=GREEN, ls=":", label="normal, mortar" if axis is axes[0] else "mortar")
     for axis, title in zip(axes, ("L2 error of nodal forces [-]", "iterations of ccx", "time of ccx [s]")):
         axis.set(xlabel="penalty factor K h / E [-]", ylabel=title)
         axis.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncol=2 if axis is axes[0] else 1)

@@ -1,0 +1,128 @@
+"""How the figures of a report look: colours, markers, lines, labels, axes. Colours are those of Okabe and Ito."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
+MARKERS = "osD^vP*X<>hpd8H1"  # one for each of 16 methods; colours come back after eight, with other lines
+FLOOR = 1e-2  # residuals below this fraction of the tolerance asked for are drawn there: they answer no question
+LEAST_RESIDUAL = 1e-17  # drawn in place of 0
+NEAR_X, NEAR_Y = 60.0, 11.0  # pixels between labels that would run into each other
+POINTS = 0.72  # of a pixel at the usual resolution of a figure
+LONGEST = 26  # characters of a label
+MOST_ROUNDS = 20  # of sixteen methods in one figure
+CELLS = 240  # of a map, above which no numbers are written into them
+NAMES = {
+    "solve_seconds": "time of the method [s]",
+    "call_seconds": "time of the whole call [s]",
+    "cpu_seconds": "CPU time of the whole call [s]",
+    "peak_mb": "peak memory [MB]",
+    "iterations": "outer iterations",
+    "error": "relative error of the forces [-]",
+    "residual": "natural-map residual [-]",
+    "contacts": "contacts",
+    "problem.contacts": "contacts",
+    "problem.mu": "friction coefficient [-]",
+    "problem.stiffness_ratio": "E lower / E upper [-]",
+    "problem.elements": "elements across the half-width",
+    "method.rho": "penalty factor rho [-]",
+    "problem.coupling": "Dundurs' constant [-]",
+    "method.factor": "penalty factor [-]",
+    "problem.upper_nu": "Poisson's ratio, upper body [-]",
+}
+
+
+def styles() -> list[dict[str, Any]]:
+    """Sixteen that differ in marker, and in colour or line; they come back after that."""
+    made = [
+        {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i], "ls": "-" if i < len(COLOURS) else "--"}
+        for i in range(len(MARKERS))
+    ]
+    return made * MOST_ROUNDS
+
+
+def short_label(name: str, labels: Mapping[str, str] = MappingProxyType({})) -> str:
+    """The label that was given for a name; else the name itself, where it is long with the values of its settings only.
+
+    normal_qp(backend='clarabel', exact=True) becomes 'normal_qp clarabel exact'.
+    """
+    if name in labels:
+        return str(labels[name])
+    head, bracket, settings = name.partition("(")
+    if len(name) <= LONGEST or not bracket:
+        return name
+    words = [head]
+    for setting in settings.rstrip(")").split(", "):
+        key, _, value = setting.partition("=")
+        if value != "False":
+            words.append(key if value == "True" else value.strip("'") if value.startswith("'") else setting)
+    return " ".join(words)
+
+
+def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
+    """The names of lines in their colours beside their last points (x, y, name, colour), one above the other where they meet."""
+    ax.autoscale_view()
+    taken: list[tuple[float, float]] = []  # places of labels in pixels
+    for x, y, name, colour in sorted(ends, key=lambda end: end[1]):
+        across, up = (float(place) for place in ax.transData.transform((x, y)))
+        shift = 3.0
+        while any(abs(across - other) < NEAR_X and abs(up + shift - height) < NEAR_Y for other, height in taken):
+            shift += NEAR_Y
+        taken.append((across, up + shift))
+        ax.annotate(name, (x, y), (5, shift * POINTS), textcoords="offset points", color=colour, fontsize=7)
+
+
+def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any) -> None:
+    """The numbers of a map in its cells, black on light colours and white on dark ones."""
+    values = grid.to_numpy(float)
+    if values.size > CELLS:
+        return
+    for (row, column), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            colour = "black" if float(norm(max(value, norm.vmin))) > 0.6 else "white"
+            text = short_tick(float(f"{value:.0f}" if 10 <= abs(value) < 1000 else f"{value:.1g}"))
+            ax.text(column, row, text, ha="center", va="center", fontsize=6, color=colour)
+
+
+def make_figure(columns: int = 1, rows: int = 1, size: Sequence[float] = (7.6, 4.4)) -> tuple[Any, Any]:
+    """A figure and its axes, of that size each [inch]."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
+    return figure, figure.subplots(rows, columns)
+
+
+def set_ticks(axis: Any) -> None:
+    """At 1, 2, 5 on a logarithmic axis of less than two decades, where the usual labels run into each other."""
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    if high < 100 * low:
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def add_legend(figure: Any, ax: Any, title: str | None = None) -> Any:
+    """The figure with a grid and a legend beside it."""
+    ax.grid(alpha=0.3)
+    handles, labels = ax.get_legend_handles_labels()
+    if handles:
+        figure.legend(
+            handles, labels, loc="outside right upper", frameon=False, fontsize=8, title=title, title_fontsize=8
+        )
+    return figure
+
+
+def short_tick(value: float) -> str:
+    """100000.0 -> 1e5"""
+    plain, power = f"{value:g}", f"{value:.1e}".replace(".0e", "e").replace("e+0", "e").replace("e-0", "e-")
+    return power if len(power) < len(plain) and float(power) == value else plain

@@ -1,0 +1,181 @@
+"""Triangles and tetrahedra divided where they are marked, with named boundaries kept and curved boundaries kept curved.
+
+scikit-fem divides the elements, by red, green and blue patterns in the plane and by bisection in space, but forgets the
+named boundaries. Every new boundary facet lies in one old boundary facet, which gives it its names. New nodes then move to
+the surface that the mesh stands for.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import skfem
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.spatial import cKDTree
+
+from contactopt.bodies.elements import is_curved, straight
+
+log = logging.getLogger(__name__)
+Curve = Callable[[np.ndarray], np.ndarray]
+NEAREST = 16  # old facets among which the one that holds a new facet is looked for
+FLAT = 0.1  # least share of its volume that an element keeps where its nodes move to a curved boundary
+CORNER = np.deg2rad(30)  # turn of a polygon between two edges from which on it is a corner of the body
+
+
+def simplices(mesh: Any) -> Any:
+    """The mesh as straight triangles or tetrahedra; quadrilaterals and hexahedra are cut, curved edges become straight."""
+    if is_curved(mesh):
+        mesh = replace(straight(mesh), _boundaries=mesh.boundaries)
+    if isinstance(mesh, skfem.MeshQuad):
+        return _named(mesh, replace(mesh.to_meshtri(), _boundaries=None))
+    if isinstance(mesh, skfem.MeshHex):
+        return _named(mesh, replace(mesh.to_meshtet(), _boundaries=None))
+    return mesh
+
+
+def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Curve]) -> Any:
+    """The mesh with the marked elements divided, and others as far as it takes to stay conforming.
+
+    Parameters
+    ----------
+    mesh : MeshTri or MeshTet of scikit-fem, with named boundaries
+    marked : numbers of the elements to divide
+    curves : for the names of curved boundaries, a function (dim, k) -> (dim, k) that puts new nodes on the true surface
+
+    Returns
+    -------
+    A mesh of the same kind with the same named boundaries.
+    """
+    logging.getLogger("skfem").setLevel(logging.ERROR)  # it warns that boundaries are lost, which are restored here
+    fine = _named(mesh, mesh.refined(np.asarray(marked)))
+    new = np.arange(mesh.p.shape[1], fine.p.shape[1])
+    points = fine.p.copy()
+    for name, curve in curves.items():
+        mine = np.intersect1d(new, np.unique(fine.facets[:, fine.boundaries[name]]))
+        if len(mine):
+            points[:, mine] = curve(points[:, mine])
+    sizes, moved = _volumes(fine.p, fine.t), _volumes(points, fine.t)
+    if np.any(moved * np.sign(sizes) < FLAT * np.abs(sizes)):
+        log.warning(
+            "new nodes stay on the edges of the mesh: on the curved boundary they would turn elements inside out"
+        )
+        return fine
+    return replace(fine, doflocs=points)
+
+
+def _volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """(t,) signed volumes of simplices, times the factorial of the dimension."""
+    edges = points[:, cells[1:]] - points[:, cells[:1]]
+    return np.asarray(np.linalg.det(np.moveaxis(edges, 2, 0)))
+
+
+def _named(old: Any, new: Any) -> Any:
+    """`new` with the named boundaries of `old`, whose boundary facets hold those of `new`."""
+    if not old.boundaries:
+        return new
+    dim, facets, outer = len(old.p), old.boundary_facets(), new.boundary_facets()
+    choices = list(combinations(range(len(old.facets)), dim))  # of quadrilaterals all triangles between their corners
+    corners = np.concatenate([old.p[:, old.facets[list(choice)][:, facets]] for choice in choices], axis=2)
+    facets = np.tile(facets, len(choices))
+    centres = new.p[:, new.facets[:, outer]].mean(axis=1)
+    count = min(NEAREST, len(facets))
+    near = cKDTree(corners.mean(axis=1).T).query(centres.T, k=count)[1].reshape(len(outer), count)
+    parent = facets[near[np.arange(len(outer)), np.argmin(_outside(corners[:, :, near], centres), axis=1)]]
+    names = {name: outer[np.isin(parent, members)] for name, members in old.boundaries.items()}
+    return replace(new, _boundaries={name: np.sort(members).astype(np.int32) for name, members in names.items()})
+
+
+def _outside(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """How far points (dim, f) are from facets with corners (dim, dim, f, c), over the size of the facets: (f, c)."""
+    origin, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
+    offset = points[:, :, None] - origin
+    gram = np.einsum("iafc,ibfc->fcab", edges, edges)
+    weights = np.linalg.solve(gram, np.einsum("iafc,ifc->fca", edges, offset)[..., None])[..., 0]
+    beyond = np.maximum(np.maximum(-weights, 0).max(axis=-1), np.maximum(weights.sum(axis=-1) - 1, 0))
+    height = np.linalg.norm(offset - np.einsum("iafc,fca->ifc", edges, weights), axis=0)
+    return np.asarray(beyond + height / np.sqrt(np.trace(gram, axis1=2, axis2=3)))
+
+
+def boundary_curve(mesh: Any, name: str) -> Curve | None:
+    """The smooth line through the nodes of a plane boundary, by arc length; None in space and for straight boundaries.
+
+    Where the boundary turns by more than CORNER it has a corner, and the pieces between corners are smooth by themselves.
+    """
+    if mesh.p.shape[0] != 2:
+        return None
+    facets, points = mesh.boundaries[name], mesh.p
+    edges = mesh.facets[:, facets]
+    if is_curved(mesh):
+        points, middle = mesh.doflocs, mesh.dofs.facet_dofs[0, facets]
+        edges = np.concatenate([[edges[0], middle], [middle, edges[1]]], axis=1)
+    pieces = [_Piece(points[:, chain]) for chain in _chains(edges, points)]
+    bent = [piece for piece in pieces if not piece.flat]
+    if not bent:
+        return None
+
+    def curve(points: np.ndarray) -> np.ndarray:
+        found = [piece.place(points) for piece in pieces]
+        closest = np.argmin([distance for _, distance in found], axis=0)
+        return np.asarray(np.stack([place for place, _ in found])[closest, :, np.arange(points.shape[1])].T)
+
+    return curve
+
+
+class _Piece:
+    """A chain of nodes (2, m) between two corners, and the line through them."""
+
+    def __init__(self, nodes: np.ndarray) -> None:
+        steps = np.linalg.norm(np.diff(nodes, axis=1), axis=0)
+        self.nodes, self.arc = nodes, np.concatenate([[0.0], np.cumsum(steps)])
+        turns = np.diff(np.unwrap(np.arctan2(*np.diff(nodes, axis=1)[::-1])))
+        self.flat = nodes.shape[1] < 3 or bool(np.all(np.abs(turns) < 1e-9))
+        closed = nodes.shape[1] > 3 and np.array_equal(nodes[:, 0], nodes[:, -1])
+        if self.flat:
+            self.line: Any = PchipInterpolator(self.arc, nodes.T) if nodes.shape[1] > 1 else None
+        else:
+            self.line = CubicSpline(self.arc, nodes.T, bc_type="periodic" if closed else "not-a-knot")
+
+    def place(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The places (2, k) on the line for points near it, and how far (k,) these are from the polygon."""
+        a, edge = self.nodes[:, :-1], np.diff(self.nodes, axis=1)
+        offset = points[:, :, None] - a[:, None]
+        share = np.clip(np.sum(offset * edge[:, None], axis=0) / np.sum(edge**2, axis=0), 0, 1)
+        distance = np.linalg.norm(offset - share * edge[:, None], axis=0)
+        best = np.argmin(distance, axis=1)
+        rows = np.arange(points.shape[1])
+        at = self.arc[best] + share[rows, best] * np.diff(self.arc)[best]
+        return np.asarray(self.line(at)).T, distance[rows, best]
+
+
+def _chains(edges: np.ndarray, points: np.ndarray) -> list[np.ndarray]:
+    """Edges (2, f) joined to chains of nodes that end at ends and at corners."""
+    neighbours: dict[int, list[int]] = {}
+    for a, b in edges.T.tolist():
+        neighbours.setdefault(a, []).append(b)
+        neighbours.setdefault(b, []).append(a)
+    ends = {node for node, others in neighbours.items() if len(others) != 2 or _turns(points, node, others)}
+    left = {tuple(sorted(edge)) for edge in edges.T.tolist()}
+    chains = []
+    while left:
+        open_ends = [node for edge in left for node in edge if node in ends]
+        chain = [open_ends[0] if open_ends else next(iter(left))[0]]
+        while True:
+            follow = [n for n in neighbours[chain[-1]] if tuple(sorted((chain[-1], n))) in left]
+            if not follow or (len(chain) > 1 and chain[-1] in ends):
+                break
+            left.remove(tuple(sorted((chain[-1], follow[0]))))
+            chain.append(follow[0])
+        chains.append(np.array(chain))
+    return chains
+
+
+def _turns(points: np.ndarray, node: int, others: list[int]) -> bool:
+    """Whether the boundary has a corner at a node between two others."""
+    before, after = points[:, node] - points[:, others[0]], points[:, others[1]] - points[:, node]
+    angle = np.arctan2(before[0] * after[1] - before[1] * after[0], before @ after)
+    return bool(abs(angle) > CORNER)

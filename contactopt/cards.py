@@ -1,0 +1,26 @@
+"""Short texts about results: one line for a terminal, a small table for a notebook."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping
+
+
+def count(number: int, thing: str, things: str = "") -> str:
+    """A number of things in words that agree: '1 contact', '2 contacts'."""
+    return f"{number} {thing if number == 1 else things or thing + 's'}"
+
+
+def line(name: str, *facts: str) -> str:
+    """The one-line `repr` of an object: its class, and facts about it."""
+    return f"{name}({', '.join(fact for fact in facts if fact)})"
+
+
+def card(title: str, rows: Mapping[str, object]) -> str:
+    """A small HTML table of names and values, for notebooks. All texts are escaped."""
+    cells = "".join(
+        f'<tr><th scope="row" style="text-align:left">{html.escape(str(name))}</th>'
+        f'<td style="text-align:left">{html.escape(str(value))}</td></tr>'
+        for name, value in rows.items()
+    )
+    return f"<table><caption>{html.escape(title)}</caption><tbody>{cells}</tbody></table>"

@@ -1,0 +1,201 @@
+"""What each command does with its options; returns the exit code."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from contactopt.cards import count
+from contactopt.errors import InputError
+from contactopt.solving.methods import NATIVE
+
+FORCES = {("mm", "MPa"): "N", ("m", "Pa"): "N", ("m", "kPa"): "kN", ("m", "MPa"): "MN", ("in", "psi"): "lbf"}
+Command = Callable[[argparse.Namespace], int]
+
+
+def arguments_of(texts: list[str]) -> dict[str, Any]:
+    """The values of NAME=VALUE texts. A value is a number, true, false or a list as in TOML; anything else is a text."""
+    found: dict[str, Any] = {}
+    for text in texts:
+        name, sign, value = text.partition("=")
+        name = name.strip().replace("-", "_")
+        if not sign or not name.isidentifier():
+            raise InputError(f"--set needs NAME=VALUE, as in --set width=30; got {text!r}.")
+        try:
+            found[name] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[name] = value
+    return found
+
+
+def run(options: argparse.Namespace) -> int:
+    from contactopt.runner import run
+
+    out = options.out or f"out/{Path(options.scene).stem}"
+    names = ("mu", "force", "degree", "simplices")
+    changes = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    given = arguments_of(options.set)
+    twice = sorted(set(given) & {*changes, *(["elements"] if options.elements is not None else [])})
+    if twice:
+        raise InputError(f"{twice[0]!r} is given twice, by --set and by --{twice[0]}.")
+    elements = given.pop("elements", options.elements)
+    silent = options.quiet or options.json
+    result = run(
+        options.scene,
+        out,
+        method=options.method,
+        normal=options.normal,
+        tangential=options.tangential,
+        preconditioner=options.preconditioner,
+        Q=options.q,
+        solver=options.solver,
+        tol=options.tol,
+        elements=elements,
+        accuracy=options.accuracy,
+        quantity=options.quantity,
+        adaptive=options.adaptive,
+        figures=tuple(options.figures),
+        html=options.html,
+        note=lambda text: None if silent else print(f"  {text}", file=sys.stderr, flush=True),
+        team=options.team,
+        **(changes | given),
+    )
+    if options.json:
+        print(json.dumps(result.summary, indent=2))
+    else:
+        _print_result(result, out)
+        if options.team is not None:
+            print(
+                f"{options.team.size} ranks, {options.team.traffic.messages} messages, {options.team.traffic.length} bytes"
+            )
+    return 0 if result.solution.solved and (result.estimate is None or result.estimate.reached) else 1
+
+
+def _print_result(result: Any, out: str) -> None:
+    s = result.summary
+    contacts = count(s["contact_nodes"], "contact node")
+    print(f"{s['scene']}: {count(s['dofs'], 'unknown')}, {contacts}, mu = {s['mu']:g}")
+    steps = count(s["outer_iterations"], "iteration")
+    print(f"{s['status']}: {result.solution.message}; {steps}, residual {s['residual']:.1e}")
+    if s["q"] == "implicit":
+        print(f"Q by {s['products']} products, never formed")
+    native = s["normal_backend"] == s["tangential_backend"] == NATIVE
+    by = f", normal problem by {s['normal_backend']}, tangential by {s['tangential_backend']}"
+    print(f"method {s['method']}" + ("" if native else by))
+    length, stress = result.scene.units
+    force = FORCES.get((length, stress), f"{stress} {length}^2")
+    approach = "none (no plate)" if s["approach"] is None else f"{s['approach']:.6g} {length}"
+    print(
+        f"normal force {s['normal_force']:.6g} {force}, approach {approach}, "
+        f"largest pressure {s['max_pressure']:.6g} {stress}"
+    )
+    if s["contact_half_width"] is not None:
+        print(
+            f"contact half-width {s['contact_half_width']:.6g} {length}, "
+            f"stick half-width {s['stick_half_width']:.6g} {length}"
+        )
+    if result.estimate is not None:
+        _print_estimate(result.estimate)
+    seconds = s["seconds"]
+    print(f"{seconds['total']:.1f} s: " + ", ".join(f"{k} {v:.2f}" for k, v in seconds.items() if k != "total"))
+    print(f"files in {out}: {', '.join(sorted(file.name for file in Path(out).iterdir()))}")
+
+
+def _print_estimate(estimate: Any) -> None:
+    error = "unknown" if estimate.error is None else f"{estimate.error:.1e}"
+    print(f"{estimate.quantity} {estimate.value:.6g}, estimated relative error {error}, asked for {estimate.target:g}:")
+    print(f"  {estimate.message}")
+    for level in estimate.levels:
+        print(f"  {level.mesh}: {level.unknowns} unknowns, {level.value:.6g}, {level.seconds:.2f} s")
+
+
+def view(options: argparse.Namespace) -> int:
+    import webbrowser
+
+    from contactopt.figures.page import write_page
+
+    page = write_page(options.folder, options.out or Path(options.folder) / "view.html")
+    if not options.no_open:
+        webbrowser.open(page.resolve().as_uri())
+    print(f"{page} is the result as a page; open it in a browser")
+    return 0
+
+
+def show(options: argparse.Namespace) -> int:
+    from contactopt.figures.sheet import describe
+
+    print(describe(options.scene, arguments_of(options.set)))
+    return 0
+
+
+def new(options: argparse.Namespace) -> int:
+    from contactopt.scenes.example import write_example
+
+    write_example(Path(options.file))
+    print(f"{options.file} is an example that runs: contactopt run {options.file}")
+    return 0
+
+
+def bench(options: argparse.Namespace) -> int:
+    from contactopt.benchmark.campaign import run_campaign
+    from contactopt.benchmark.page import refusals, report_campaign
+    from contactopt.benchmark.store import load
+
+    try:
+        folder = run_campaign(
+            options.file,
+            options.out,
+            jobs=options.jobs,
+            resume=options.resume,
+            filters=options.filter,
+            scheduler=options.scheduler,
+            quiet=options.quiet,
+        )
+    except KeyboardInterrupt:
+        print("contactopt: interrupted; finished runs are kept, go on with --resume", file=sys.stderr)
+        return 130
+    table = load(folder)
+    runs = count(len(table), "run")
+    print(f"{runs}: " + ", ".join(f"{n} {status}" for status, n in table["status"].value_counts().items()))
+    for sentence in refusals(table):
+        print(f"  {sentence}")
+    print(f"results in {folder}: rows.parquet (read them with contactopt.benchmark.load)")
+    page = report_campaign(folder, options.file)
+    more = "" if page.suffix == ".html" else "; a page to explore needs: pip install 'contactopt[view]'"
+    print(f"report: {page}{more}")
+    return 0
+
+
+def report(options: argparse.Namespace) -> int:
+    from contactopt.benchmark.campaign import run_reports
+    from contactopt.benchmark.page import report_campaign
+
+    folders = [Path(name) for name in options.names if Path(name).is_dir() and any(Path(name).glob("rows.*"))]
+    if folders and len(folders) == len(options.names) and not options.run:
+        for folder in folders:
+            print(f"report: {report_campaign(folder)}")
+        return 0
+    paths = sorted(Path(options.experiments).glob("*.toml"))
+    page = run_reports(paths, options.reports, options.run, options.names, options.jobs)
+    print(f"reports in {page.parent}, all of them in {page}")
+    return 0
+
+
+def listing(options: argparse.Namespace) -> int:
+    from contactopt.cli.lists import print_lists
+
+    print_lists()
+    return 0
+
+
+def completion(options: argparse.Namespace) -> int:
+    from contactopt.cli.completion import script
+    from contactopt.cli.parser import make_parser
+
+    print(script(make_parser(), options.shell))
+    return 0

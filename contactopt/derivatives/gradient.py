@@ -1,0 +1,92 @@
+"""The gradient of a quantity of a solved scene by the parameters of the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from contactopt.derivatives.kinks import Weak
+from contactopt.derivatives.outputs import seeds_of
+from contactopt.derivatives.parameters import parameters as parameters_of
+from contactopt.derivatives.states import Chain, Seeds, along, chain_of
+from contactopt.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """A quantity and its derivatives.
+
+    value  of the quantity;  by  name of a parameter -> derivative, a number or for a field (k,)
+    weak   (number of the state, contact) for every weakly active contact. Where there is one, the quantity has no gradient:
+           `by` is that of the piece at which the solver ended, and `onesided` gives the derivative along a direction
+    """
+
+    value: float
+    by: dict[str, Any]
+    weak: tuple[tuple[int, Weak], ...]
+    chain: Chain
+    quantity: Any
+    state: int
+
+    @property
+    def differentiable(self) -> bool:
+        return not self.weak
+
+    @property
+    def sentence(self) -> str:
+        """What the derivatives are, for people."""
+        if self.differentiable:
+            return "the quantity has a gradient here: no contact is weakly active"
+        named = ", ".join(f"{weak.contact} ({weak.edge}) in state {number}" for number, weak in self.weak[:5])
+        return (
+            f"the quantity has no gradient here, only one-sided derivatives: {len(self.weak)} weakly active contacts, "
+            f"{named}{' and more' if len(self.weak) > 5 else ''}"
+        )
+
+    def onesided(self, direction: dict[str, Any]) -> float:
+        """The derivative along a direction, name of a parameter -> amount, one-sided where contacts are weakly active."""
+        scene = self.chain.steps[0].reduction.scene
+        chosen = {which: direction[which.name] for which in parameters_of(tuple(direction), scene)}
+        for number, moved in enumerate(self.chain.forward(chosen)):
+            if number == self.state:
+                return along(seeds_of(self.quantity, self.chain.steps[number]), moved, chosen)
+        raise InputError(f"the path has no state {self.state}.")
+
+
+def gradient(
+    result: Any, quantity: Any, parameters: str | Sequence[str], state: int = -1, distance: float | None = None
+) -> Gradient:
+    """The gradient of a quantity of a solved scene, or of one state of a load path, by the parameters of the scene.
+
+    One adjoint solve of the interface problem and one of each body serve all parameters; on a path, those of every state.
+
+    Parameters
+    ----------
+    result : what contactopt.run or contactopt.follow returned
+    quantity : a name of contactopt.derivatives.outputs, such as 'approach', 'energy', 'pressure:12' or 'shear_force', or a
+        Functional
+    parameters : names of contactopt.derivatives.parameters, such as 'mu', 'E:upper', 'force:upper:y' or 'gap'. A load of a
+        path is changed by the same amount in all states
+    state : of a load path, the number of the state at which the quantity is read; by default the last
+    distance : to a kink within which a contact is weakly active, as for sensitivity()
+
+    Returns
+    -------
+    Gradient : value, `by` (name -> derivative), and whether there is a gradient at all
+
+    Raises
+    ------
+    InputError : for a result that is not certified, an unknown quantity, and a parameter that does not enter the scene
+
+    Sources: those of contactopt.derivatives.
+    """
+    chain = chain_of(result, distance)
+    if not -len(chain.steps) <= state < len(chain.steps):
+        raise InputError(f"the path has {len(chain.steps)} states; there is no state {state}.")
+    state %= len(chain.steps)
+    chain = Chain(chain.steps[: state + 1])
+    which = parameters_of(parameters, chain.steps[0].reduction.scene)
+    seeds: list[Seeds | None] = [None] * len(chain.steps)
+    own = seeds[state] = seeds_of(quantity, chain.steps[state])
+    return Gradient(own.value, chain.adjoint(seeds, which), chain.weak, chain, quantity, state)

@@ -1,0 +1,303 @@
+"""The derivative of a solution by the data of its interface problem: q, the law's parameter mu, s, Q and V."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from contactopt.checks import check_number, real_array
+from contactopt.derivatives.kinks import Onesided, Weak, weak_contacts
+from contactopt.derivatives.linear import Tangent
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem, Scales, Solution, dimensionless, natural_map_residual
+from contactopt.problem.operators import Interface, InterfaceOperator
+from contactopt.problem.scaling import immovable
+from contactopt.solving.kernels.alart_curnier import coulomb_equations
+
+CERTIFIED = 1e-5  # largest certificate of a solution whose derivative means anything
+NEAR = 1e-6  # distance to a kink, over the largest force, within which a contact is weakly active
+ROUNDING = 100  # and this many times the certificate, if that is more
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """How a solution changes: reactions (k, dim), multipliers (p,) and displacements u (k, dim), for one direction."""
+
+    reactions: np.ndarray
+    multipliers: np.ndarray
+    displacements: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Dual:
+    """The gradient of a function of the solution by the data of the problem, in the unit of the function over theirs.
+
+    q   (k, dim);  mu  (k,) by the law's parameter at each contact;  s  (p,)
+    reactions, multipliers  of the solution, with which df = sum (q r') * dQ + sum V * dV
+    """
+
+    q: np.ndarray
+    s: np.ndarray
+    reactions: np.ndarray
+    multipliers: np.ndarray
+    by_parameter: Callable[[], np.ndarray]
+
+    @cached_property
+    def mu(self) -> np.ndarray:
+        return self.by_parameter()
+
+    def along_Q(self, change: Any) -> float:
+        """df for a change of Q (k dim, k dim): an array, a sparse matrix, or an operator with products."""
+        return float(self.q.ravel() @ np.asarray(change @ self.reactions.ravel()))
+
+    @property
+    def Q(self) -> np.ndarray:
+        """(k dim, k dim) by the entries of Q, an outer product."""
+        return np.outer(self.q, self.reactions)
+
+    @property
+    def V(self) -> np.ndarray:
+        """(k dim, p) by the entries of V."""
+        return np.outer(self.q, self.multipliers) + np.outer(self.reactions, self.s)
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """The linear system of the derivatives at one solution. It is factorised, or set up, once.
+
+    distance  to a kink, over the largest force, within which a contact counts as weakly active [-]
+    """
+
+    problem: InterfaceProblem
+    solution: Solution
+    distance: float
+
+    @cached_property
+    def _scaled(self) -> tuple[InterfaceProblem, Scales]:
+        return dimensionless(self.problem)
+
+    @cached_property
+    def _point(self) -> np.ndarray:
+        """y = r - rho u (k, dim) [force]."""
+        problem, r = self.problem, self.solution.reactions
+        u = problem.displacements(r, self.solution.multipliers)
+        return np.asarray(r - self._rho[:, None] * u)
+
+    @cached_property
+    def _rho(self) -> np.ndarray:
+        """(k,) [force / length]."""
+        scaled, scales = self._scaled
+        return coulomb_equations(scaled).rho * scales.force / scales.length
+
+    @cached_property
+    def tangent(self) -> Tangent:
+        """The matrix M, dimensionless."""
+        scaled, scales = self._scaled
+        return Tangent(scaled, self._rho * scales.length / scales.force, slopes(self.problem, self._point))
+
+    @cached_property
+    def weak(self) -> tuple[Weak, ...]:
+        """The weakly active contacts, at which the solution has one-sided derivatives only."""
+        return weak_contacts(self.problem.law, self._point, self.distance * self.force)
+
+    @property
+    def differentiable(self) -> bool:
+        """Whether no contact is weakly active, so that the solution has a gradient."""
+        return not self.weak
+
+    @property
+    def force(self) -> float:
+        """The largest force, with which distances to kinks are compared."""
+        return float(np.linalg.norm(self.solution.reactions, axis=1).max(initial=0.0)) or self._scaled[1].force
+
+    @property
+    def sentence(self) -> str:
+        """What is known of the derivative, for people."""
+        if self.differentiable:
+            return "the solution has a gradient here: no contact is weakly active"
+        named = ", ".join(f"{weak.contact} ({weak.edge})" for weak in self.weak[:5])
+        more = f" and {len(self.weak) - 5} more" if len(self.weak) > 5 else ""
+        return (
+            f"the solution has no gradient here, only one-sided derivatives: {len(self.weak)} of {self.problem.contacts} "
+            f"contacts are weakly active, within {self.distance:g} of the largest force of a kink: {named}{more}"
+        )
+
+    @cached_property
+    def _moves(self) -> np.ndarray:
+        """1 where a component can move, else 0 (k, dim): on a plane of symmetry a displacement is no datum."""
+        return np.where(immovable(self.problem), 0.0, 1.0).reshape(self.problem.q.shape)
+
+    @cached_property
+    def _by_parameter(self) -> np.ndarray:
+        return self.problem.law.project_by_parameter(self._point)
+
+    def forward(self, *, q: Any = None, mu: Any = None, s: Any = None, Q: Any = None, V: Any = None) -> Change:
+        """The change of the solution along one direction of the data; where contacts are weakly active, the one-sided one.
+
+        Parameters
+        ----------
+        q : (k, dim) change of q [length]
+        mu : (k,) or one number, change of the law's parameter
+        s : (p,) change of the resultants [force]
+        Q : (k dim, k dim) change of Q: an array, a sparse matrix, or an operator with products
+        V : (k dim, p) change of V
+
+        Returns
+        -------
+        Change : of reactions, multipliers and displacements
+
+        Raises
+        ------
+        InputError : on changes of the wrong shape, and where the solution has no derivative because it is not unique
+        """
+        problem, r, lam = self.problem, self.solution.reactions, self.solution.multipliers
+        du = _given("q", q, problem.q.shape).copy()
+        dmu = None if mu is None else _given("mu", mu, (problem.contacts,))
+        ds = _given("s", s, problem.s.shape).copy()
+        if Q is not None:
+            du += np.asarray(_shaped("Q", Q, 2 * (r.size,)) @ r.ravel()).reshape(r.shape)
+        if V is not None:
+            turned = _given("V", V, problem.V.shape)
+            du += (turned @ lam).reshape(r.shape)
+            ds += turned.T @ r.ravel()
+        dr, dlam = self._solve(du, dmu, ds)
+        if self.weak:
+            direction = np.zeros(problem.contacts) if dmu is None else dmu
+            extra = self.onesided.step(self._moved(dr, dlam, du), direction)
+            dr, dlam = dr + extra[0], dlam + extra[1]
+        return Change(dr, dlam, (problem.Q @ dr.ravel() + problem.V @ dlam).reshape(r.shape) + du)
+
+    @cached_property
+    def onesided(self) -> Onesided:
+        """The complementarity problem of the weakly active contacts."""
+        contacts = np.array([weak.contact for weak in self.weak], dtype=int)
+
+        def response(error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            dr, dlam = self._unscaled(*self.tangent.solve(error.ravel() / self._scaled[1].force, 0 * self.problem.s))
+            return dr, dlam, self._moved(dr, dlam, 0 * dr)
+
+        by_parameter = self._by_parameter if np.any(self.problem.law.rough) else 0 * self._point
+        return Onesided.of(
+            self.problem.law, self._point, contacts, self.tangent.D, by_parameter, self.distance * self.force, response
+        )
+
+    def adjoint(self, *, reactions: Any = None, multipliers: Any = None, displacements: Any = None) -> Dual:
+        """The gradient by all data of a function f(r, lambda, u), from one solve with the transposed matrix.
+
+        Where contacts are weakly active (`differentiable` is False) it is the gradient of the piece at which the solver
+        ended, an element of the generalised derivative and no gradient of f.
+
+        Parameters
+        ----------
+        reactions : (k, dim) df/dr
+        multipliers : (p,) df/dlambda
+        displacements : (k, dim) df/du, of u = Q r + V lambda + q
+
+        Raises
+        ------
+        InputError : as forward()
+        """
+        problem, (_, scales) = self.problem, self._scaled
+        by_r = _given("reactions", reactions, problem.q.shape)
+        by_lam = _given("multipliers", multipliers, problem.s.shape)
+        by_u = _given("displacements", displacements, problem.q.shape)
+        if np.any(by_u):
+            by_r = by_r + transposed_product(problem.Q, by_u.ravel()).reshape(by_r.shape)
+            by_lam = by_lam + problem.V.T @ by_u.ravel()
+        z, a, b = self.tangent.solve_transposed((scales.force * by_r).ravel(), scales.multipliers * by_lam)
+        by_q = by_u - self._moves * z.reshape(by_u.shape) / scales.length
+        by_s = -b * scales.multipliers / (scales.force * scales.length)
+
+        def by_parameter() -> np.ndarray:
+            P_mu, whole = self._by_parameter, a
+            if np.any(P_mu.ravel()[~self.tangent.is_closed]):  # friction without a normal force, as in Tresca's law
+                whole = a + self.tangent.on_open((scales.force * by_r).ravel(), z, b)
+            return np.asarray(np.sum(P_mu * whole.reshape(P_mu.shape), axis=1) / scales.force)
+
+        return Dual(by_q, by_s, self.solution.reactions, self.solution.multipliers, by_parameter)
+
+    def _solve(self, du: np.ndarray, dmu: np.ndarray | None, ds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """dr and dlambda on the piece of P at which the solver ended."""
+        _, scales = self._scaled
+        error = -self.tangent.slope((self._moves * du).ravel() / scales.length)
+        if dmu is not None:
+            error += (self._by_parameter * dmu[:, None]).ravel() / scales.force
+        balance = -ds * scales.multipliers / (scales.force * scales.length)
+        return self._unscaled(*self.tangent.solve(error, balance))
+
+    def _unscaled(self, dr: np.ndarray, dlam: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self._scaled[1].to_physical(dr.reshape(self.problem.q.shape), dlam)
+
+    def _moved(self, dr: np.ndarray, dlam: np.ndarray, du: np.ndarray) -> np.ndarray:
+        """dy = dr - rho (Q dr + V dlambda + du), (k, dim) [force]."""
+        moved = (self.problem.Q @ dr.ravel() + self.problem.V @ dlam).reshape(du.shape) + du
+        return np.asarray(dr - self._rho[:, None] * moved)
+
+
+def sensitivity(problem: InterfaceProblem, solution: Solution, distance: float | None = None) -> Sensitivity:
+    """The derivative of a certified solution by the data of its problem, as an operator with products forward and adjoint.
+
+    Nothing is solved before it is asked for; the factors are then kept and serve all directions.
+
+    Parameters
+    ----------
+    problem : the interface problem
+    solution : its certified solution
+    distance : to a kink, over the largest force, within which a contact counts as weakly active [-]; by default 1e-6, or a
+        hundred certificates of the solution if that is more
+
+    Returns
+    -------
+    Sensitivity : with `forward`, `adjoint`, `weak`, `differentiable` and a `sentence` that says what is known
+
+    Raises
+    ------
+    InputError : for a solution that is not certified, or that belongs to another problem
+
+    Sources: those of contactopt.derivatives.
+    """
+    if not isinstance(problem, InterfaceProblem) or not isinstance(solution, Solution):
+        raise InputError(
+            "sensitivity needs an InterfaceProblem and its Solution; "
+            f"got {type(problem).__name__} and {type(solution).__name__}."
+        )
+    residual = natural_map_residual(problem, solution.reactions, solution.multipliers)
+    if not solution.solved or not residual <= CERTIFIED:
+        raise InputError(
+            f"only a certified solution has a derivative; this one is '{solution.status}' with the residual {residual:.1e} on "
+            "this problem: solve it with a smaller tol first."
+        )
+    if distance is None:
+        distance = max(NEAR, ROUNDING * residual)
+    check_number("distance", distance, low=0.0)
+    return Sensitivity(problem, solution, distance)
+
+
+def slopes(problem: InterfaceProblem, y: np.ndarray) -> np.ndarray:
+    """The derivative D (k, d, d) of the law's map at y; a contact without friction has no tangential force, even at rest."""
+    D = problem.law.project(y)[1].copy()
+    D[~problem.law.rough, 1:, :] = 0.0
+    return D
+
+
+def transposed_product(Q: Interface, x: np.ndarray) -> np.ndarray:
+    """Q' x; an operator is symmetric."""
+    return np.asarray(Q @ x if isinstance(Q, InterfaceOperator) else Q.T @ x)
+
+
+def _given(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """The array of that shape; zeros if there is none, and one number fills it."""
+    if value is None:
+        return np.zeros(shape)
+    array = real_array(name, value)
+    return np.broadcast_to(array, shape) if array.ndim == 0 else _shaped(name, array, shape)
+
+
+def _shaped(name: str, value: Any, shape: tuple[int, ...]) -> Any:
+    if getattr(value, "shape", None) != shape:
+        raise InputError(f"{name} must have the shape {shape}; got {getattr(value, 'shape', type(value).__name__)}.")
+    return value

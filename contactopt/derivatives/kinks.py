@@ -1,0 +1,151 @@
+"""Weakly active contacts, and the one-sided derivatives of a solution there.
+
+At a weakly active contact the point y lies on an edge between pieces of the map P: between open and closed, between stick and
+slip, or at the apex where both meet. P has a directional derivative, P'(y; dy) = D dy on the piece into which dy leads. With
+the piece D0 that the other contacts see,
+
+    M (dr, dlambda) = right side + z,   z = (D - D0) dy + (P_mu - P_mu0) dmu,   z zero but at the weakly active contacts.
+
+The linear system gives dy = dy0 + S z with as many columns as there are unknowns at these contacts. What is left is a
+small complementarity problem in z: which contacts open or slip in this direction. It is solved by Newton's method on the
+pieces, from many starts if need be, and what comes back has been checked to satisfy it.
+
+Sources: Robinson (1980), Strongly regular generalized equations; Luo, Pang, Ralph (1996), chapter 4.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactopt.errors import InputError
+from contactopt.problem.laws import Kinks, Law
+
+STEP = 1e-7  # how far into a piece its derivative is read, over the largest force
+EXACT = 1e-6  # relative error of a one-sided derivative at the weakly active contacts
+STEPS, STARTS = 30, 200
+MOST = 600  # unknowns at weakly active contacts
+
+logger = logging.getLogger(__name__)
+Response = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Weak:
+    """A weakly active contact: its number, and the edge on which it lies."""
+
+    contact: int
+    edge: str
+
+
+def weak_contacts(law: Law, y: np.ndarray, distance: float) -> tuple[Weak, ...]:
+    """The contacts whose point y (k, dim) lies within a distance [force] of a kink."""
+    kinks = law.kinks(y, distance)
+    names = {
+        (True, False): "open / closed",
+        (False, True): "stick / slip",
+        (True, True): "apex: open / closed, stick / slip",
+    }
+    both = zip(kinks.normal.tolist(), kinks.tangential.tolist())
+    return tuple(Weak(i, names[which]) for i, which in enumerate(both) if any(which))
+
+
+@dataclass(frozen=True, eq=False)
+class Onesided:
+    """The complementarity problem of m weakly active contacts.
+
+    law, y      of these contacts, y (m, d) on the kinks;  contacts  (m,) their numbers;  force  scale [force]
+    D, P_mu     (m, d, d) and (m, d) of the piece that M has
+    dr, dlam    (m d, k, d) and (m d, p) responses to a unit of z
+    S           (m d, m d) and the dy at these contacts that goes with it
+    """
+
+    law: Law
+    y: np.ndarray
+    contacts: np.ndarray
+    force: float
+    D: np.ndarray
+    P_mu: np.ndarray
+    dr: np.ndarray
+    dlam: np.ndarray
+    S: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        law: Law,
+        y: np.ndarray,
+        contacts: np.ndarray,
+        D: np.ndarray,
+        P_mu: np.ndarray,
+        distance: float,
+        response: Response,
+    ) -> Onesided:
+        """From the map at all contacts, and the response (dr, dlambda, dy) of the linear system to an error (k, d)."""
+        d, own = y.shape[1], law.select(contacts)
+        if len(contacts) * d > MOST:
+            raise InputError(
+                f"{len(contacts)} contacts are weakly active, too many for one-sided derivatives; solve the problem with a smaller "
+                "tol, or give a smaller distance."
+            )
+        logger.info("one-sided derivative: %d weakly active contacts", len(contacts))
+        kinks = law.kinks(y, distance)
+        place = own.on_kinks(y[contacts], Kinks(kinks.normal[contacts], kinks.tangential[contacts]))
+        answers = []
+        for contact in contacts:
+            for component in range(d):
+                unit = np.zeros(y.shape)
+                unit[contact, component] = 1.0
+                answers.append(response(unit))
+        dr, dlam, dy = (np.array(part) for part in zip(*answers))
+        S = dy[:, contacts].reshape(len(dy), -1).T
+        size = float(np.linalg.norm(y, axis=1).max(initial=0.0))
+        return cls(own, place, contacts, size, D[contacts], P_mu[contacts], dr, dlam, S)
+
+    def step(self, dy: np.ndarray, dmu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What to add to dr (k, d) and dlambda (p,) of the piece M, from its dy (k, d) and dmu (k,)."""
+        dy0, dmu = dy[self.contacts], dmu[self.contacts]
+        z = self._solve(dy0, dmu)
+        return np.tensordot(z, self.dr, 1), z @ self.dlam
+
+    def _solve(self, dy0: np.ndarray, dmu: np.ndarray) -> np.ndarray:
+        """z (m d,) of the complementarity problem; InputError if none is found."""
+        rng = np.random.default_rng(0)
+        size = float(np.abs(dy0).max(initial=0.0) + self.force * np.abs(dmu).max(initial=0.0))
+        for start in range(STARTS):
+            guess = dy0 if start == 0 else size * rng.normal(size=dy0.shape)
+            for _ in range(STEPS):
+                D, moved = self._piece(guess, dmu)
+                change = np.zeros((len(self.S), len(self.S)))
+                d, i = dy0.shape[1], np.arange(len(dy0))
+                change.reshape(len(i), d, len(i), d)[i, :, i, :] = D - self.D
+                try:
+                    z = np.linalg.solve(np.eye(len(self.S)) - change @ self.S, change @ dy0.ravel() + moved.ravel())
+                except np.linalg.LinAlgError:
+                    break
+                guess = dy0 + (self.S @ z).reshape(dy0.shape)
+                if self._error(z, guess, dmu) <= EXACT * (size + np.abs(guess).max()):
+                    return np.asarray(z)
+        raise InputError(
+            "no one-sided derivative was found: the complementarity problem of the weakly active contacts has none."
+        )
+
+    def _piece(self, dy: np.ndarray, dmu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """D (m, d, d) of the piece into which dy leads, and (P_mu - P_mu0) dmu (m, d)."""
+        size = max(float(np.abs(dy).max(initial=0.0)), self.force * float(np.abs(dmu).max(initial=0.0))) or 1.0
+        t = STEP * self.force / size
+        law, place = self.law.shifted(t * dmu), self.y + t * dy
+        D = law.project(place)[1].copy()
+        D[~law.rough, 1:, :] = 0.0
+        if not np.any(dmu):
+            return D, np.zeros(dy.shape)
+        return D, (law.project_by_parameter(place) - self.P_mu) * dmu[:, None]
+
+    def _error(self, z: np.ndarray, dy: np.ndarray, dmu: np.ndarray) -> float:
+        """By how much z misses the problem at dy."""
+        D, moved = self._piece(dy, dmu)
+        wanted = np.einsum("mab,mb->ma", D - self.D, dy) + moved
+        return float(np.abs(wanted - z.reshape(dy.shape)).max(initial=0.0))

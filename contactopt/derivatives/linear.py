@@ -1,0 +1,303 @@
+"""The matrix M of Newton's last step and its transpose: solved by factors, by products with Q, or with the bodies at once.
+
+    M = [[I - D + D rho Q, D rho V], [V', 0]]
+
+Open contacts, D = 0, have unit rows in M. They leave the system, and what is left is square in the closed contacts and the
+multipliers. Every form of Q has a class that solves that system K and its transpose for any number of right sides; the factors
+are made once. Iterative solves are repeated on what is left of the right side until it is small enough.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+from scipy.sparse.linalg import LinearOperator, gmres, splu
+
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.coupled import CoupledForm
+from contactopt.problem.operators import InterfaceOperator
+from contactopt.problem.stacked import Stacked, Vector, norm
+from contactopt.solving.kernels.coupled import fitted
+from contactopt.solving.kernels.flexible import flexible_gmres
+from contactopt.solving.kernels.krylov import model_of
+from contactopt.solving.kernels.linearised import SLIPPING
+from contactopt.solving.preconditioners import Preconditioner
+
+SINGULAR = 1e-13  # reciprocal condition of K below which it counts as singular
+ACCURACY = 1e-11  # relative residual of an iterative solve
+ROUND, INNER = 1e-4, 1e-6  # reduction of the residual by one round of GMRES, and by GMRES for the model of Q
+ROUNDS = 12
+RESTART, CYCLES = 60, 3
+UNIQUE = (
+    "the solution has no derivative, because its linear system is singular: forces or motions are not unique there; remove "
+    "redundant contacts, or hold the bodies."
+)
+
+Pair = tuple[np.ndarray, np.ndarray]  # for the contacts (k d,), for the balance or the multipliers (p,)
+Act = Callable[[np.ndarray], np.ndarray]
+
+
+class Closed(Protocol):
+    """What solves K x = right and K' x = right, for right (n + p,)."""
+
+    def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """M at a solution of a dimensionless problem.
+
+    problem  dimensionless;  rho  (k,) steps of the natural map;  D  (k, d, d) derivative of the map P
+    """
+
+    problem: InterfaceProblem
+    rho: np.ndarray
+    D: np.ndarray
+
+    def solve(self, error: np.ndarray, balance: np.ndarray) -> Pair:
+        """dr (k d,) and dlambda (p,) with M (dr, dlambda) = (error, balance)."""
+        Q, V, closed, n = self.problem.Q, self.problem.V, self.closed, len(self.closed)
+        dr = np.where(self.is_closed, 0.0, error)
+        right = np.concatenate([error[closed], balance - V.T @ dr])
+        if np.any(dr):
+            right[:n] -= self.slope(Q @ dr)[closed]
+        x = self.system.solve(right, False) if len(right) else right
+        dr[closed] = x[:n]
+        return dr, x[n:]
+
+    def solve_transposed(
+        self, by_r: np.ndarray, by_multipliers: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """z = D' rho a (k d,), a (k d,) where D is not zero, and b (p,), with M' (a, b) = (by_r, by_multipliers)."""
+        closed, n = self.closed, len(self.closed)
+        right = np.concatenate([by_r[closed], by_multipliers])
+        x = self.system.solve(right, True) if len(right) else right
+        a = np.zeros(len(by_r))
+        a[closed] = x[:n]
+        return self.slope_transposed(a), a, x[n:]
+
+    def on_open(self, by_r: np.ndarray, z: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """a (k d,) on the contacts with D = 0, zero elsewhere, for what solve_transposed returned; one product with Q'."""
+        Q = self.problem.Q
+        moved = Q @ z if isinstance(Q, InterfaceOperator) else Q.T @ z
+        return np.where(self.is_closed, 0.0, by_r - moved - self.problem.V @ b)
+
+    def slope(self, moved: np.ndarray) -> np.ndarray:
+        """D rho moved, (k d,)."""
+        return np.asarray(np.einsum("kab,k,kb->ka", self.D, self.rho, moved.reshape(self.D.shape[:2])).ravel())
+
+    def slope_transposed(self, a: np.ndarray) -> np.ndarray:
+        """rho D' a, (k d,)."""
+        return np.asarray(np.einsum("kab,k,ka->kb", self.D, self.rho, a.reshape(self.D.shape[:2])).ravel())
+
+    @cached_property
+    def is_closed(self) -> np.ndarray:
+        """Mask (k d,) of the unknowns of contacts that are not open."""
+        return np.repeat(np.any(self.D != 0, axis=(1, 2)), self.D.shape[1])
+
+    @cached_property
+    def closed(self) -> np.ndarray:
+        """Numbers of these unknowns."""
+        return np.flatnonzero(self.is_closed)
+
+    @cached_property
+    def system(self) -> Closed:
+        """K by the means that fit the form of Q; InputError where it is singular."""
+        Q = self.problem.Q
+        if isinstance(Q, InterfaceOperator):
+            return Krylov(self) if Q.coupled is None else Coupled(self, Q.coupled)
+        return Sparse(self) if sp.issparse(Q) else Dense(self)
+
+
+class Dense:
+    """K and its factors as arrays."""
+
+    def __init__(self, tangent: Tangent):
+        problem, closed, d = tangent.problem, tangent.closed, tangent.problem.dim
+        n, p = len(closed), len(problem.s)
+        Q = problem.Q if n == problem.q.size else problem.Q[np.ix_(closed, closed)]
+        D = tangent.D[closed[::d] // d]
+        scaled = tangent.rho[closed[::d] // d, None, None] * D
+        K = np.zeros((n + p, n + p))
+        K[:n, :n] = (scaled @ Q.reshape(n // d, d, n)).reshape(n, n)
+        K[:n, n:] = (scaled @ problem.V[closed].reshape(n // d, d, p)).reshape(n, p)
+        K[n:, :n] = problem.V[closed].T
+        i = np.arange(n // d)
+        K[:n, :n].reshape(len(i), d, len(i), d)[i, :, i, :] += np.eye(d) - D
+        size = np.linalg.norm(K, 1) if n + p else 0.0
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", la.LinAlgWarning)
+            self.factors = la.lu_factor(K, overwrite_a=True, check_finite=False)
+        if n + p and not la.lapack.dgecon(self.factors[0], size)[0] > SINGULAR:
+            raise InputError(UNIQUE)
+
+    def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
+        return np.asarray(la.lu_solve(self.factors, right, trans=int(transposed), check_finite=False))
+
+
+class Sparse:
+    """K and its factors, sparse: many bodies of which each touches few others."""
+
+    def __init__(self, tangent: Tangent):
+        problem, closed, d = tangent.problem, tangent.closed, tangent.problem.dim
+        k, p, V = problem.contacts, len(problem.s), sp.csr_array(problem.V)
+        scaled = sp.bsr_array((tangent.rho[:, None, None] * tangent.D, np.arange(k), np.arange(k + 1))).tocsr()
+        rest = sp.bsr_array((np.eye(d) - tangent.D, np.arange(k), np.arange(k + 1))).tocsr()
+        rows = (scaled @ problem.Q + rest)[closed][:, closed]
+        border = (scaled @ V)[closed], V[closed].T
+        K = sp.block_array([[rows, border[0]], [border[1], sp.csr_array((p, p))]], format="csc")
+        try:
+            self.factors = splu(K)
+        except RuntimeError as error:
+            raise InputError(UNIQUE) from error
+        pivots = np.abs(self.factors.U.diagonal())
+        if not pivots.min(initial=1.0) > SINGULAR * pivots.max(initial=1.0):
+            raise InputError(UNIQUE)
+
+    def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
+        return np.asarray(self.factors.solve(right, trans="T" if transposed else "N"))
+
+
+class Krylov:
+    """K by products with Q: GMRES, preconditioned by the same system with the model of Q (contactopt.solving.preconditioners)."""
+
+    def __init__(self, tangent: Tangent, P: Preconditioner | None = None):
+        self.tangent = tangent
+        self.P = model_of(tangent.problem) if P is None else P
+        self.rough = {flag: rough_inverse(tangent, self.P, flag) for flag in (False, True)}
+
+    def product(self, x: np.ndarray, transposed: bool, act: Act) -> np.ndarray:
+        """K x or K' x (n + p,), where act makes the products with Q or its model."""
+        tangent, V, n = self.tangent, self.tangent.problem.V, len(self.tangent.closed)
+        full = np.zeros(len(V))
+        full[tangent.closed] = x[:n]
+        D = tangent.D
+        if transposed:
+            z = tangent.slope_transposed(full)
+            kept = np.einsum("kab,ka->kb", D, full.reshape(D.shape[:2])).ravel()
+            top, bottom = full - kept + act(z) + V @ x[n:], V.T @ z
+        else:
+            kept = np.einsum("kab,kb->ka", D, full.reshape(D.shape[:2])).ravel()
+            top, bottom = full - kept + tangent.slope(act(full) + V @ x[n:]), V.T @ full
+        return np.concatenate([top[tangent.closed], bottom])
+
+    def inverse(self, transposed: bool) -> Act:
+        """An approximate inverse of K or K': that for the model of Q to INNER, or a rough one without a model."""
+        rough, model = self.rough[transposed], self.P.model
+        if model is None:
+            return rough
+        return lambda x: _gmres(lambda y: self.product(y, transposed, model.matvec), x, INNER, rough)
+
+    def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
+        Q = self.tangent.problem.Q
+
+        def product(x: np.ndarray) -> np.ndarray:
+            return self.product(x, transposed, lambda y: Q @ y)
+
+        inverse = self.inverse(transposed)
+        return refined(product, lambda rest: _gmres(product, rest, ROUND, inverse), right, np.ones(len(right)))
+
+
+class Coupled:
+    """K with the equilibrium of the bodies beside it, so that no product with Q is needed (contactopt.solving.kernels.coupled).
+
+    With Q = T A^-1 T' + R the unknowns X of the bodies are eliminated by A X = T' dr forward, by A X = -T' z in the adjoint.
+    One flexible GMRES iteration sees bodies and contacts; one V-cycle per body stands for A^-1 in its preconditioner.
+    """
+
+    def __init__(self, tangent: Tangent, form: CoupledForm):
+        self.tangent, self.form = tangent, form
+        self.contacts = Krylov(tangent, fitted(model_of(tangent.problem, deflate=False), form))
+
+    def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
+        tangent, form, contacts = self.tangent, self.form, self.contacts
+        n, sign = len(tangent.closed), -1.0 if transposed else 1.0
+        inverse = contacts.inverse(transposed)
+
+        def forces(x: np.ndarray) -> np.ndarray:
+            """What the contacts do to the bodies: dr or z (k d,)."""
+            full = np.zeros(tangent.problem.q.size)
+            full[tangent.closed] = x[:n]
+            return tangent.slope_transposed(full) if transposed else full
+
+        def product(x: Stacked) -> Stacked:
+            X, rest = Stacked(x.parts[:-1]), x.parts[-1]
+            bodies = form.stiffness(X) - sign * form.pulled(forces(rest))
+            lower = contacts.product(rest, transposed, lambda y: form.moved(sign * X, y))
+            return Stacked((*bodies.parts, lower))
+
+        def precondition(x: Stacked) -> Stacked:
+            rest = inverse(x.parts[-1])
+            bodies = form.approximate(Stacked(x.parts[:-1]) + sign * form.pulled(forces(rest)))
+            return Stacked((*bodies.parts, rest))
+
+        rho = np.repeat(tangent.rho, tangent.problem.dim)[tangent.closed]
+        share = rho**0.5 if transposed else rho**-0.5
+        weights = Stacked((*(form.diagonal() ** -0.5).parts, np.concatenate([share, np.ones(len(tangent.problem.s))])))
+        none = form.pulled(np.zeros(tangent.problem.q.size))
+        whole = Stacked((*none.parts, right))
+        found = refined(
+            product, lambda rest: flexible_gmres(product, precondition, rest, weights, ROUND), whole, weights
+        )
+        return np.asarray(found.parts[-1])
+
+
+def refined(product: Callable[[Any], Any], solve: Callable[[Any], Any], right: Vector, weights: Vector) -> Any:
+    """x with |W (right - A x)| <= ACCURACY |W right| from solves of what is left; InputError if that is out of reach."""
+    x, rest = 0.0 * right, right
+    size = last = norm(weights * right)
+    for _ in range(ROUNDS):
+        if last <= ACCURACY * size:
+            return x
+        x = x + solve(rest)
+        rest = right - product(x)
+        now = norm(weights * rest)
+        if not now < 0.5 * last:
+            break
+        last = now
+    if last > 1e3 * ACCURACY * size:
+        raise InputError(UNIQUE)
+    return x
+
+
+def rough_inverse(tangent: Tangent, P: Preconditioner, transposed: bool) -> Act:
+    """P where a component is held by contact, the identity where it slips, bordered by the balance."""
+    closed, d, V = tangent.closed, tangent.D.shape[1], tangent.problem.V[tangent.closed]
+    n = len(closed)
+    rho = np.repeat(tangent.rho, d)[closed]
+    inside = np.diagonal(tangent.D, axis1=1, axis2=2).ravel()[closed] > SLIPPING
+    unknowns = closed[inside]
+    before, after = (1.0, 1 / rho[inside]) if transposed else (1 / rho[inside], 1.0)
+
+    def apply(x: np.ndarray) -> np.ndarray:
+        y, full = x.copy(), np.zeros(P.shape[0])
+        full[unknowns] = before * x[inside]
+        y[inside] = after * (P @ full)[unknowns]
+        return y
+
+    held = inside[:, None] * V
+    left, right = (held, rho[:, None] * held) if transposed else (rho[:, None] * held, V)
+    Y = np.stack([apply(v) for v in left.T], axis=1) if V.shape[1] else V
+    K = np.linalg.pinv(right.T @ Y)
+
+    def solve(x: np.ndarray) -> np.ndarray:
+        y = apply(x[:n])
+        multipliers = K @ (right.T @ y - x[n:])
+        return np.concatenate([y - Y @ multipliers, multipliers])
+
+    return solve
+
+
+def _gmres(product: Act, right: np.ndarray, rtol: float, inverse: Act) -> np.ndarray:
+    shape = (len(right), len(right))
+    A = LinearOperator(shape, matvec=lambda x: product(x.ravel()), dtype=float)
+    M = LinearOperator(shape, matvec=lambda x: inverse(x.ravel()), dtype=float)
+    return np.asarray(gmres(A, right, rtol=rtol, restart=min(len(right), RESTART), maxiter=CYCLES, M=M)[0])

@@ -1,0 +1,326 @@
+"""Derivatives through the reduction and along load paths.
+
+At fixed contact forces r and multipliers lambda a parameter of the scene moves each body by dU_b, the relative displacement by
+du = sum B_b dU_b + dgap n, the balance by ds, and the law's parameter by dmu (contactopt.interface.reduction). A change dA of
+a stiffness acts like the load -dA U: dU = -C dA U, so that neither dC nor dQ is ever formed. What follows is the derivative of the
+interface problem by q, s and mu (contactopt.derivatives.interface).
+
+The adjoint takes the gradient (q*, s*, mu*) by these data back to the bodies. With G_b = B_b' q* and W_b = C_b G_b + motions_b s*
+the derivative by a constant of a material is -W_b' dA_b U_b, and that by a load f is W_b' df: one solve per body serves all
+parameters.
+
+On a load path the slip of a state is measured from the state before, q_t = q_t(theta) - u_t before. Forward, du_t before is
+handed on from state to state; backward, the gradient by u_t before is added to that of the earlier state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from contactopt.analysis.paths import PathResult
+from contactopt.checks import real_array
+from contactopt.derivatives.interface import Change, Dual, Sensitivity, sensitivity
+from contactopt.derivatives.kinks import Weak
+from contactopt.derivatives.parameters import MATERIAL, Parameter
+from contactopt.errors import InputError
+from contactopt.interface.reduction import Reduction, reduce_bodies
+from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem.laws import find_law
+from contactopt.scenes.scene import Scene
+from contactopt.solving.driver import solve
+
+Direction = Mapping[Parameter, Any]  # a number, or for a field one per contact
+
+
+@dataclass(frozen=True, eq=False)
+class Seeds:
+    """A function of one solved state: its value, and its derivatives by what the state holds.
+
+    reactions (k, dim), multipliers (p,), displacements (k, dim) of u, slip (k, dim) of u measured from the state before,
+    bodies: (n,) by U of each body at fixed forces and
+    multipliers;  explicit: by a scalar parameter at fixed forces, multipliers and displacements
+    """
+
+    value: float
+    reactions: Any = None
+    multipliers: Any = None
+    displacements: Any = None
+    slip: Any = None
+    bodies: tuple[Any, ...] = ()
+    explicit: Callable[[Parameter], float] = field(default=lambda which: 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Explicit:
+    """What a direction changes at fixed forces and multipliers: u (k, dim), the balance (p,), the law (k,), U of each body."""
+
+    u: np.ndarray
+    s: np.ndarray
+    mu: np.ndarray
+    bodies: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """How one state changes: in all, in its displacements measured from the state before (k, dim), and explicitly."""
+
+    change: Change
+    slip: np.ndarray
+    explicit: Explicit
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One solved state: the reduction under its loads, and the problem that its solution was certified against."""
+
+    reduction: Reduction
+    problem: InterfaceProblem
+    solution: Solution
+    distance: float | None = None
+
+    @cached_property
+    def sensitivity(self) -> Sensitivity:
+        return sensitivity(self.problem, self.solution, self.distance)
+
+    @cached_property
+    def displaced(self) -> tuple[np.ndarray, ...]:
+        """U (n,) of every body."""
+        return self.reduction.displaced(self.solution.reactions, self.solution.multipliers)
+
+    @cached_property
+    def forces(self) -> tuple[np.ndarray, ...]:
+        """Contact forces (n,) on every body."""
+        return tuple(B.T @ self.solution.reactions.ravel() for B in self.reduction.maps)
+
+    def law_change(self, which: Parameter) -> np.ndarray:
+        """Derivative (k,) of the law's parameter by the friction of pairs of surfaces."""
+        out, areas = np.zeros(self.problem.contacts), self.problem.areas
+        chosen = [pair.name for pair in which.pairs(self.reduction.scene)]
+        for pair, made in zip(self.reduction.scene.pairs, self.problem.pairs):
+            if pair.name in chosen:
+                law = find_law(pair.law).of_place(np.ones(made.stop - made.start), areas[made.contacts])
+                out[made.contacts] = getattr(law, law.parameters[0])
+        return out
+
+    def loads(self, which: Parameter, number: int) -> tuple[Any, Any, float]:
+        """The scene and the body's part with a load changed by a step, and the step: bodies are affine in their loads."""
+        scene = self.reduction.scene
+        value = which.read(scene)
+        step = abs(value) or 1.0
+        changed = which.put(scene, value + step)
+        return changed, changed.parts[number], step
+
+    def explicit(self, direction: Direction, base: Reduction) -> Explicit:
+        """What the direction changes; `base` has the materials, whose matrices are kept there."""
+        problem = self.problem
+        du, dmu = np.zeros(problem.q.shape), np.zeros(problem.contacts)
+        dU = [np.zeros(len(U)) for U in self.displaced]
+        ds = [np.zeros(len(body.resultants)) for body in self.reduction.bodies]
+        for which, amount in direction.items():
+            if which.is_field:
+                change = _one_per_contact(which, amount, problem.contacts)
+                du[:, 0] += change if which.kind == "gap" else 0.0
+                dmu += change if which.kind == "friction" else 0.0
+            elif which.kind == "mu":
+                dmu += amount * self.law_change(which)
+            for number, part in enumerate(self.reduction.scene.parts):
+                if not which.concerns(part):
+                    continue
+                if which.kind in MATERIAL:
+                    moved, balance = base.bodies[number].material_change(
+                        which.kind, self.displaced[number], self.forces[number]
+                    )
+                else:
+                    scene, other, step = self.loads(which, number)
+                    old, new = self.reduction.bodies[number], self.reduction.bodies[number].loaded(scene, other)
+                    moved, balance = (new.at_rest - old.at_rest) / step, (new.resultants - old.resultants) / step
+                dU[number] += amount * moved
+                ds[number] += amount * balance
+        for B, own in zip(self.reduction.maps, dU):
+            du += (B @ own).reshape(du.shape)
+        return Explicit(du, np.concatenate(ds), dmu, tuple(dU))
+
+    def work(self, which: Parameter, dual: Duals, base: Reduction) -> Any:
+        """The derivative by one parameter from the gradient by the data of the problem."""
+        if which.kind == "gap":
+            return dual.q[:, 0]
+        if which.kind == "friction":
+            return dual.mu
+        if which.kind == "mu":
+            return float(dual.mu @ self.law_change(which))
+        total = 0.0
+        for number, part in enumerate(self.reduction.scene.parts):
+            if not which.concerns(part):
+                continue
+            G, weights, W = dual.forces[number], dual.weights[number], dual.fields[number]
+            if which.kind in MATERIAL:
+                total += base.bodies[number].material_work(
+                    which.kind, self.displaced[number], self.forces[number], G, W
+                )
+            else:
+                scene, other, step = self.loads(which, number)
+                total += self.reduction.bodies[number].load_work(scene, other, G, weights, W) / step
+        return total
+
+
+@dataclass(frozen=True, eq=False)
+class Duals:
+    """The gradient by the data of one state's problem, taken back to the bodies: G, s* and W of the module's head."""
+
+    step: Step
+    dual: Dual
+    bodies: tuple[Any, ...]
+
+    @property
+    def q(self) -> np.ndarray:
+        return self.dual.q
+
+    @property
+    def mu(self) -> np.ndarray:
+        return self.dual.mu
+
+    @cached_property
+    def weights(self) -> tuple[np.ndarray, ...]:
+        return self.step.reduction.own_multipliers(self.dual.s)
+
+    @cached_property
+    def forces(self) -> tuple[np.ndarray, ...]:
+        given = self.bodies or (None,) * len(self.step.reduction.maps)
+        made = (np.asarray(B.T @ self.dual.q.ravel()) for B in self.step.reduction.maps)
+        return tuple(G if own is None else G + own for G, own in zip(made, given))
+
+    @cached_property
+    def fields(self) -> tuple[np.ndarray, ...]:
+        parts = zip(self.step.reduction.bodies, self.forces, self.weights)
+        return tuple(body.displacement(G, own) - body.at_rest for body, G, own in parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """The states of a load path in their order; a scene without a path is a chain of one."""
+
+    steps: tuple[Step, ...]
+
+    @property
+    def weak(self) -> tuple[tuple[int, Weak], ...]:
+        """The weakly active contacts of every state: (number of the state, contact)."""
+        return tuple((n, weak) for n, step in enumerate(self.steps) for weak in step.sensitivity.weak)
+
+    def forward(self, direction: Direction) -> Iterator[Moved]:
+        """State by state, how the solution changes along a direction; displacements are total ones."""
+        base = self.steps[0].reduction
+        before = np.zeros(self.steps[0].problem.q.shape)
+        for step in self.steps:
+            explicit = step.explicit(direction, base)
+            mu = explicit.mu if np.any(explicit.mu) else None
+            change = step.sensitivity.forward(q=explicit.u - before, mu=mu, s=explicit.s)
+            slip = change.displacements
+            change = replace(change, displacements=slip + before)
+            yield Moved(change, slip, explicit)
+            before = change.displacements.copy()
+            before[:, 0] = 0.0
+
+    def adjoint(self, seeds: Sequence[Seeds | None], which: Sequence[Parameter]) -> dict[str, Any]:
+        """The gradient of the sum of functions of the states, by name of the parameter."""
+        base = self.steps[0].reduction
+        carried = np.zeros(self.steps[0].problem.q.shape)
+        total: dict[str, Any] = {one.name: 0.0 for one in which}
+        for step, own in zip(reversed(self.steps), reversed(seeds)):
+            if own is None and not np.any(carried):
+                continue
+            given = Seeds(0.0) if own is None else own
+            by_u = carried if given.displacements is None else carried + given.displacements
+            weights = by_u if given.slip is None else by_u + given.slip
+            dual = step.sensitivity.adjoint(
+                reactions=given.reactions, multipliers=given.multipliers, displacements=weights
+            )
+            back = Duals(step, dual, given.bodies)
+            for one in which:
+                direct = 0.0 if one.is_field else given.explicit(one)
+                total[one.name] = total[one.name] + step.work(one, back, base) + direct
+            carried = by_u - dual.q
+            carried[:, 0] = 0.0
+        return total
+
+
+def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
+    """The change of a function of a state along a direction, from what Chain.forward gives."""
+    total = sum(amount * seeds.explicit(which) for which, amount in direction.items() if not which.is_field)
+    for weight, part in (
+        (seeds.reactions, moved.change.reactions),
+        (seeds.multipliers, moved.change.multipliers),
+        (seeds.displacements, moved.change.displacements),
+        (seeds.slip, moved.slip),
+        *zip(seeds.bodies, moved.explicit.bodies),
+    ):
+        if weight is not None:
+            total += float(np.sum(weight * part))
+    return float(total)
+
+
+def chain_of(result: Any, distance: float | None = None) -> Chain:
+    """The solved states of a result: of contactopt.run, contactopt.follow, or anything with a reduction and a solution.
+
+    Raises InputError for anything else, and for a state that is not certified.
+    """
+    path = result if isinstance(result, PathResult) else getattr(result, "path", None)
+    if path is None:
+        reduction, solution = getattr(result, "reduction", None), getattr(result, "solution", None)
+        if not isinstance(reduction, Reduction) or not isinstance(solution, Solution):
+            raise InputError(
+                "a derivative needs a solved scene: what contactopt.run or contactopt.follow returns; "
+                f"got {type(result).__name__}."
+            )
+        return Chain((Step(reduction, reduction.problem, solution, distance),))
+    steps = []
+    for number, state in enumerate(path.states):
+        reduction = path.reduction.loaded(state.scene)
+        problem = replace(reduction.problem, q=state.q, s=state.s)
+        steps.append(Step(reduction, problem, state.solution, distance))
+        if not state.solution.solved:
+            raise InputError(f"state {number} of the path is not certified; a derivative needs all states solved.")
+    return Chain(tuple(steps))
+
+
+def _one_per_contact(which: Parameter, amount: Any, contacts: int) -> np.ndarray:
+    array = real_array(f"the change of '{which.name}'", amount)
+    if array.shape not in ((), (contacts,)):
+        raise InputError(f"the change of '{which.name}' must have the shape ({contacts},); got {array.shape}.")
+    return np.broadcast_to(array, (contacts,))
+
+
+def solved_chain(
+    scenes: Sequence[Scene], tol: float, base: Reduction | None = None, starts: Sequence[Solution] | None = None
+) -> Chain:
+    """The certified states of a load path, without their energies; a path of one scene is one state.
+
+    Parameters
+    ----------
+    scenes : the states in their order
+    tol : bound on the certificate of every state
+    base : a reduction of the same bodies, which is then only loaded anew
+    starts : a solution for every state, to start from
+
+    Raises InputError where a state has no solution or is not solved.
+    """
+    steps: list[Step] = []
+    before = None
+    for number, scene in enumerate(scenes):
+        base = reduce_bodies(scene) if base is None else base.loaded(scene)
+        q = base.problem.q.copy()
+        if before is not None:
+            q[:, 1:] -= before[:, 1:]
+        problem = replace(base.problem, q=q)
+        start = starts[number] if starts is not None else steps[-1].solution if steps else None
+        solution = solve(problem, tol=tol, start=start)
+        if not solution.solved:
+            raise InputError(f"state {number} of scene '{scene.name}' was not solved: {solution.message}.")
+        steps.append(Step(base, problem, solution))
+        moved = problem.displacements(solution.reactions, solution.multipliers)
+        before = moved if before is None else moved + np.concatenate([0 * before[:, :1], before[:, 1:]], axis=1)
+    return Chain(tuple(steps))

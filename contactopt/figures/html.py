@@ -1,0 +1,82 @@
+"""Pages that stand alone: one HTML file with its data, its program and plotly inside, which opens without a network.
+
+plotly is stored compressed, at a third of its size, and unpacked by the browser. Data are JSON; arrays are base64 of their
+bytes. Names in the data reach the page as text only, and the page may load nothing from elsewhere.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html
+import json
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.errors import InputError
+from contactopt.files import whole_file
+
+POLICY = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:"
+KINDS = {"f": ("f4", "<f4"), "i": ("i4", "<i4"), "u": ("i4", "<i4"), "b": ("i4", "<i4")}
+
+
+def check_installed() -> None:
+    """Raise InputError unless plotly is installed, of which the pages hold a copy."""
+    if find_spec("plotly") is None:
+        raise InputError("pages to explore need plotly; install it with: pip install 'contactopt[view]'.")
+
+
+def packed(array: Any) -> dict[str, Any]:
+    """An array for the data of a page: numbers of four bytes each."""
+    array = np.asarray(array)
+    name, kind = KINDS[array.dtype.kind]
+    data = np.ascontiguousarray(array.astype(kind))
+    return {"type": name, "shape": list(array.shape), "data": base64.b64encode(data.tobytes()).decode()}
+
+
+def write_html(file: str | Path, title: str, body: str, data: Mapping[str, Any], programs: Sequence[str]) -> Path:
+    """Write a page; returns its path.
+
+    Parameters
+    ----------
+    file : where to write it
+    title : of the page, plain text
+    body : HTML between header and programs, with every name in it escaped
+    data : what the programs read; anything that JSON can hold
+    programs : names of JavaScript files in contactopt/figures/pages, run in this order once plotly is there
+
+    Raises
+    ------
+    InputError : if plotly is not installed, or the file cannot be written
+    """
+    check_installed()
+    from plotly.offline import get_plotlyjs
+
+    plotly = base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
+    texts = {name: _page_file(name) for name in ("page.css", "start.js", *programs)}
+    encoded = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
+    parts = [
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">',
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f"<title>{html.escape(title)}</title><style>{texts['page.css']}</style></head><body>",
+        body,
+        f'<script type="application/json" id="data">{encoded}</script>',
+        f'<script type="text/plain" id="plotly">{plotly}</script>',
+        f"<script>{texts['start.js']}\nstart(() => {{\n"
+        + "\n".join(texts[name] for name in programs)
+        + "\n});</script>",
+        "</body></html>\n",
+    ]
+    with whole_file(file) as beside:
+        beside.write_text("".join(parts), encoding="utf-8")
+    return Path(file)
+
+
+def _page_file(name: str) -> str:
+    return files("contactopt.figures").joinpath("pages", name).read_text(encoding="utf-8")

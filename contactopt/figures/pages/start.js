@@ -1,0 +1,41 @@
+"use strict";
+const COLOURS = {blue: "#0072B2", orange: "#D55E00", green: "#009E73", grey: "#666666"};
+
+function element(name, text = "", attributes = {}) {
+  const made = document.createElement(name);
+  made.textContent = text;
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  return made;
+}
+
+function bytes(text) {
+  return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+}
+
+function unpack(packed) {  // the numbers of an array, without its shape
+  const data = bytes(packed.data).buffer;
+  return packed.type === "f4" ? new Float32Array(data) : new Int32Array(data);
+}
+
+function number(value) {
+  return value === null || value === undefined || !Number.isFinite(Number(value)) ? "-" : Number(value).toPrecision(4).replace(/\.?0+(e|$)/, "$1");
+}
+
+function plain(name) {  // as text in a chart: plotly reads tags and formulas in labels
+  return String(name).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;").replaceAll("$", "&#36;");
+}
+
+async function start(program) {
+  try {
+    const packed = bytes(document.getElementById("plotly").textContent);
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const script = document.createElement("script");
+    script.textContent = await new Response(stream).text();
+    document.head.append(script);
+    program();
+  } catch (fault) {
+    const said = element("p", `This page could not be drawn: ${fault.message}. It needs a browser of 2023 or later.`, {id: "fault", role: "alert"});
+    document.body.prepend(said);
+    throw fault;
+  }
+}

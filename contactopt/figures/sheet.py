@@ -1,0 +1,157 @@
+"""What a scene is, as a text: sketch, bodies with their sizes and loads, arguments, source, and what is known exactly."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from inspect import Parameter, getdoc, signature
+from typing import Any
+
+import numpy as np
+
+from contactopt.cards import count
+from contactopt.scenes import PATHS, SCENES, make_path, make_scene
+from contactopt.scenes.scene import HalfSpace, Part, Plate, Scene, Traction
+
+COLUMNS, ROWS = 60, 24  # of the sketch, at most
+ASPECT = 2.0  # height of a character over its width
+SMALL = 0.2  # a body whose size is a smaller fraction than this of the largest one's is drawn near
+MARKS = "#*o+x%@&"
+
+
+def describe(name: str, changes: dict[str, Any]) -> str:
+    """The sheet of a named scene, or of a scene file.
+
+    Parameters
+    ----------
+    name : a key of contactopt.scenes.SCENES, or a file that ends in .toml
+    changes : other values of the arguments of a named scene
+
+    Raises
+    ------
+    InputError : for an unknown scene or argument, and for a scene file with a mistake
+    """
+    if name.endswith(".toml"):
+        from contactopt.scenes.scene_files import read_scene_file
+
+        states = read_scene_file(name).states
+        head, arguments = [name], []
+    else:
+        states = make_path(name, **changes) if name in PATHS else (make_scene(name, **changes),)
+        head, arguments = [f"{name}: {SCENES[name][2]}"], _argument_lines(name)
+    scene = states[-1]
+    length, stress = scene.units
+    lines = [*head, f"kind {scene.kind}, lengths in {length}, stresses in {stress}; {scene.friction}", ""]
+    meshes = {
+        part.name: part.build_mesh(min(scene.elements, 8), scene.zone) for part in scene.parts if isinstance(part, Part)
+    }
+    if meshes:
+        lines += [*sketch(list(meshes.values())), ""]
+        lines[-1] = "  ".join(f"{mark} {part}" for mark, part in zip(MARKS, meshes)) + _section(scene)
+        lines.append("")
+    for part in scene.parts:
+        lines += _part_lines(scene, part, meshes.get(part.name))
+    images = f"; {scene.copies} mirror images make the whole" if scene.copies > 1 else ""
+    lines.append(
+        f"{count(len(scene.pairs), 'pair')} of surfaces: {', '.join(pair.name for pair in scene.pairs)}{images}"
+    )
+    if len(states) > 1:
+        lines.append(f"load path of {len(states)} states")
+    exact = "nothing is known exactly" if scene.reference is None else f"known exactly: {scene.reference.label}"
+    return "\n".join([*lines, exact, *arguments])
+
+
+def _argument_lines(name: str) -> list[str]:
+    """The docstring of the function that makes the scene, and its arguments with their values; those of its load path, too."""
+    module = SCENES[name][0]
+    fixed = SCENES[name][-1] if isinstance(SCENES[name][-1], dict) else {}
+    entries = [PATHS[name], SCENES[name]] if name in PATHS else [SCENES[name]]
+    makers = [getattr(import_module(f"contactopt.scenes.{entry[0]}"), entry[1]) for entry in entries]
+    lines = ["", *(getdoc(makers[-1]) or "").splitlines(), "", "arguments, to be changed by --set NAME=VALUE:"]
+    found = {argument: value for make in reversed(makers) for argument, value in signature(make).parameters.items()}
+    for argument, parameter in found.items():
+        if argument not in fixed and parameter.kind is not Parameter.VAR_KEYWORD:
+            value = "" if parameter.default is Parameter.empty else f" = {parameter.default!r}"
+            lines.append(f"  {argument}{value}")
+    return [*lines, f"source: contactopt/scenes/{module}.py"]
+
+
+def _section(scene: Scene) -> str:
+    if scene.copies == 1 and scene.kind != "axisymmetric":
+        return ""
+    return "  (one half of the section)" if scene.kind == "axisymmetric" else "  (the part that is modelled)"
+
+
+def _part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
+    length, stress = scene.units
+    lines = [f"body '{part.name}'"]
+    material = getattr(part, "material", None)
+    if material is not None:
+        lines[0] += f": E = {material.E:g} {stress}, nu = {material.nu:g}"
+    if mesh is not None:
+        size = " x ".join(f"{extent:g}" for extent in np.ptp(mesh.p, axis=1))
+        lines[0] += f"; {size} {length}"
+        for support in part.supports:
+            held = support.displacement
+            what = "clamped" if held is None else ", ".join(f"{c} = {v:g}" for c, v in held.items())
+            lines.append(f"  support '{support.boundary}': {what}")
+        for load in part.loads:
+            lines.append(f"  {_load(load)}")
+    elif not isinstance(part, HalfSpace):
+        lines[0] += ": rigid"
+    if getattr(part, "force", None):
+        lines.append("  total force: " + ", ".join(f"{c} = {v:g}" for c, v in part.force.items()))
+    return lines
+
+
+def _load(load: Any) -> str:
+    if isinstance(load, Plate):
+        return f"plate on '{load.boundary}': total force " + ", ".join(f"{c} = {v:g}" for c, v in load.force.items())
+    value = ", ".join(f"{v:g}" for v in load.value)
+    return f"traction on '{load.boundary}': {value}" if isinstance(load, Traction) else f"force per volume: {value}"
+
+
+def sketch(meshes: list[Any]) -> list[str]:
+    """Lines of characters, one mark per body, where its elements lie; of solids the section across the second axis."""
+    axes = [0, -1]
+    low, high = _window([mesh.p[axes] for mesh in meshes])
+    size = np.maximum(high - low, 1e-300)
+    step = max(size[0] / COLUMNS, size[1] / (ROWS * ASPECT))  # of a column
+    columns, rows = max(1, round(size[0] / step)), max(1, round(size[1] / (step * ASPECT)))
+    x = low[0] + (np.arange(columns) + 0.5) * size[0] / columns
+    y = high[1] - (np.arange(rows) + 0.5) * size[1] / rows
+    picture = np.full((rows, columns), " ")
+    for mark, mesh in zip(MARKS * len(meshes), meshes):
+        corners = mesh.p[axes][:, mesh.t]  # (2, c, cells)
+        if len(mesh.p) == 3:  # the cells that the section through the least second coordinate meets
+            second = mesh.p[1][mesh.t]
+            corners = corners[:, :, second.min(axis=0) <= second.min() + 1e-9 * np.ptp(mesh.p[1])]
+        least, most = corners.min(axis=1), corners.max(axis=1)
+        for cell in range(corners.shape[2]):
+            inside_x = np.flatnonzero((x >= least[0, cell]) & (x <= most[0, cell]))
+            inside_y = np.flatnonzero((y >= least[1, cell]) & (y <= most[1, cell]))
+            if len(inside_x) and len(inside_y):
+                block = np.ix_(inside_y, inside_x)
+                found = _inside(corners[:, :, cell], *np.meshgrid(x[inside_x], y[inside_y]))
+                picture[block] = np.where(found, mark, picture[block])
+    return ["".join(row).rstrip() for row in picture]
+
+
+def _window(places: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest coordinates (2,) of the picture: of all bodies, or about one that would be lost among larger ones."""
+    ends = np.array([[x.min(axis=1), x.max(axis=1)] for x in places])  # (bodies, 2, 2)
+    low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
+    extent = (ends[:, 1] - ends[:, 0]).max(axis=1)
+    small = int(np.argmin(extent))
+    if extent[small] > SMALL * extent.max():
+        return low, high
+    centre = ends[small].mean(axis=0)
+    return np.maximum(low, centre - extent[small]), np.minimum(high, centre + extent[small])
+
+
+def _inside(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Whether points lie in the convex hull of the corners (2, c) of a cell, seen along the axis that is left out."""
+    centre = corners.mean(axis=1, keepdims=True)
+    around = corners[:, np.argsort(np.arctan2(*(corners - centre)[::-1]))]
+    after = np.roll(around, -1, axis=1)
+    sides = (after[0] - around[0]) * (y[..., None] - around[1]) - (after[1] - around[1]) * (x[..., None] - around[0])
+    return np.asarray(np.all(sides >= -1e-9 * np.abs(sides).max(initial=0.0), axis=-1))

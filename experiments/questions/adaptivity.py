@@ -1,0 +1,386 @@
+"""How many unknowns does an accuracy need, if meshes are refined only where the quantity asked for needs it?
+
+    orders         the flat punch with its singular corners: energy and approach against the number of unknowns
+    hertz          a cylinder on a block, meshed by Gmsh without knowledge of the contact: unknowns for 1 % and .1 % of the
+                   exact peak pressure, refined locally and everywhere
+    effectivity    estimated error over true error on many scenes and quantities, the truth from much finer meshes
+    chart          error against time on one scene: uniform, graded by hand, adaptive, half-space
+
+Run all, or the parts that are named: python -m experiments.questions.adaptivity [PART ...]
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+from contactopt import HalfSpace, Material, Part, Plate, Rigid, Scene, Support, analytic, load_mesh
+from contactopt.adaptivity import refine_locally
+from contactopt.analysis.quantities import peak_pressure
+from contactopt.analysis.solve_scene import solve_scene
+from contactopt.scenes import make_scene
+from experiments.report import REPORTS, write
+
+RUBBER, STEEL = Material(5.0, 0.3), Material(210e3, 0.3)
+FOLDER = REPORTS / "adaptivity"
+
+
+def slope(x: list[float], y: list[float]) -> float:
+    """Exponent of a power law through points, by least squares."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+
+
+def orders() -> list[dict[str, Any]]:
+    """Error in the energy norm of the flat punch, as the square root of the missing energy over the whole energy."""
+    rows = []
+    truth = refine_locally(make_scene("punch-2d", degree=2), "energy", 2e-7, max_unknowns=60_000)[1].extrapolated
+    for degree, goal in ((1, 4e-4), (2, 3e-6)):
+        estimate = refine_locally(make_scene("punch-2d", degree=degree), "energy", goal, max_unknowns=100_000)[1]
+        kept = [level for level in estimate.levels if 1_000 <= level.unknowns <= 100_000]
+        errors = [np.sqrt(abs(1 - level.value / truth)) for level in kept]
+        rows += [
+            {"mesh": "adaptive", "degree": degree, "unknowns": level.unknowns, "error in the energy norm": error}
+            for level, error in zip(kept, errors)
+        ]
+        for elements in (4, 8, 16, 32, 64)[: 5 if degree == 1 else 4]:
+            scene = _even(make_scene("punch-2d", degree=degree), elements)
+            solved = solve_scene(scene)
+            energy = refine_value(solved)
+            rows.append(
+                {
+                    "mesh": "uniform",
+                    "degree": degree,
+                    "unknowns": solved.reduction.dofs,
+                    "error in the energy norm": np.sqrt(abs(1 - energy / truth)),
+                }
+            )
+    return rows
+
+
+def refine_value(solved: Any) -> float:
+    """The elastic energy of a solved scene."""
+    from contactopt.analysis.quantities import elastic_energy
+
+    return elastic_energy(solved.reduction, solved.solution)
+
+
+def _even(scene: Scene, count: int) -> Scene:
+    """The scene of the punch on even meshes, `count` squares across the half-width everywhere."""
+    from contactopt.scenes.meshes import rename, tensor_mesh
+
+    def even(part: Any) -> Any:
+        low, high = (np.array(limit) for limit in zip(*((row.min(), row.max()) for row in part.build_mesh(4, None).p)))
+        ticks = [np.linspace(a, b, max(2, round((b - a) / 20.0 * count) + 1)) for a, b in zip(low, high)]
+        names = part.build_mesh(4, None)
+        mesh = tensor_mesh(*ticks)
+        return replace(part, mesh=_named_like(names, mesh, rename))
+
+    return scene.with_parts(even)
+
+
+def _named_like(old: Any, new: Any, rename: Callable[..., Any]) -> Any:
+    """Boundaries of the new mesh where those of the old one are."""
+    found = {}
+    for name, facets in old.boundaries.items():
+        points = old.p[:, np.unique(old.facets[:, facets])]
+        low, high = points.min(axis=1) - 1e-9, points.max(axis=1) + 1e-9
+        found[name] = lambda x, low=low, high=high: np.all((x >= low[:, None]) & (x <= high[:, None]), axis=0)
+    return new.with_boundaries(found)
+
+
+def cylinder_files(folder: Path, size: float) -> tuple[Path, Path]:
+    """A half cylinder of radius 20 on a block 60 x 30, each in a file, with triangles of one size everywhere."""
+    import gmsh
+
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+    files = []
+    for name in ("cylinder", "block"):
+        gmsh.clear()
+        occ = gmsh.model.occ
+        if name == "cylinder":
+            whole, half = [(2, occ.addDisk(0, 20, 0, 20, 20))], [(2, occ.addRectangle(-20, 0, 0, 40, 20))]
+            body, _ = occ.intersect(whole, half)
+        else:
+            body = [(2, occ.addRectangle(-30, -30, 0, 60, 30))]
+        occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [tag for _, tag in body], name=name)
+        sides: dict[str, list[int]] = {}
+        for _, curve in gmsh.model.getBoundary(body, oriented=False):
+            _, y, _ = occ.getCenterOfMass(1, curve)
+            if name == "cylinder":
+                side = "top" if y > 19.9 else "arc"
+            else:
+                side = "bottom" if y < -29.9 else "top" if y > -0.1 else "side"
+            sides.setdefault(side, []).append(curve)
+        for side, curves in sides.items():
+            gmsh.model.addPhysicalGroup(1, curves, name=side)
+        gmsh.model.mesh.generate(2)
+        files.append(folder / f"{name}.msh")
+        gmsh.write(str(files[-1]))
+    gmsh.finalize()
+    return files[0], files[1]
+
+
+def cylinder(size: float, force: float) -> tuple[Scene, analytic.Reference]:
+    """The scene of the two files, in mm and N, and Hertz's solution."""
+    with TemporaryDirectory() as name:
+        upper, lower = (load_mesh(file, "mm") for file in cylinder_files(Path(name), size))
+    cylinder = Part("cylinder", upper, STEEL, (Support("top", {"x": 0.0}),), (Plate("top", {"y": -force}),), "arc")
+    block = Part("block", lower, STEEL, (Support("bottom"),), contact="top")
+    exact = analytic.hertz_line(force, 20.0, analytic.contact_modulus(STEEL, STEEL))
+    return Scene("cylinder on a block", cylinder, block, 0.0, law="frictionless"), exact
+
+
+def hertz() -> list[dict[str, Any]]:
+    """Unknowns and seconds until the peak pressure stays within 1 % and .1 % of Hertz's."""
+    rows = []
+    for degree in (1, 2):
+        scene, exact = cylinder(6.0, 1000.0)
+        scene = replace(scene, degree=degree)
+        estimate = refine_locally(scene, "pressure", 3e-4, max_unknowns=20_000)[1]
+        found = [(level.unknowns, level.value / exact.peak - 1, level.seconds) for level in estimate.levels]
+        rows += [row for bound in (1e-2, 1e-3) for row in _reached("adaptive", degree, bound, found)]
+        everywhere = []
+        for size in (6.0, 3.0, 1.5, 0.75, 0.375, 0.1875)[: 6 if degree == 1 else 5]:
+            begin = time.perf_counter()
+            solved = solve_scene(replace(cylinder(size, 1000.0)[0], degree=degree))
+            value = peak_pressure(solved.reduction, solved.solution)
+            everywhere.append((solved.reduction.dofs, value / exact.peak - 1, time.perf_counter() - begin))
+        rows += [row for bound in (1e-2, 1e-3) for row in _reached("everywhere", degree, bound, everywhere)]
+    return rows
+
+
+def _reached(how: str, degree: int, bound: float, found: list[tuple[int, float, float]]) -> Iterator[dict[str, Any]]:
+    """The first mesh from which on all errors are within the bound."""
+    inside = [abs(error) <= bound for _, error, _ in found]
+    first = len(inside) - (inside[::-1].index(False) if False in inside else len(inside))
+    row = {"refined": how, "degree": degree, "error of the peak at most": bound}
+    if first < len(found):
+        unknowns, error, seconds = found[first]
+        yield row | {"unknowns": unknowns, "its error": error, "seconds with all levels": seconds}
+    else:
+        yield row | {
+            "unknowns": f"> {found[-1][0]}",
+            "its error": found[-1][1],
+            "seconds with all levels": found[-1][2],
+        }
+
+
+def stamp(height: float) -> Scene:
+    """A stubby stamp with a shoulder, meshed by unstructured triangles, on a block; both corners are re-entrant or sharp."""
+    import gmsh
+
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 3.0)
+    occ = gmsh.model.occ
+    head, foot = (2, occ.addRectangle(-10, 5, 0, 20, height)), (2, occ.addRectangle(-4, 0, 0, 9, 5))
+    body, _ = occ.fuse([head], [foot])
+    occ.synchronize()
+    gmsh.model.addPhysicalGroup(2, [tag for _, tag in body], name="stamp")
+    sides: dict[str, list[int]] = {}
+    for _, curve in gmsh.model.getBoundary(body, oriented=False):
+        _, y, _ = occ.getCenterOfMass(1, curve)
+        side = "foot" if y < 1e-6 else "top" if y > 5 + height - 1e-6 else "side"
+        sides.setdefault(side, []).append(curve)
+    for side, curves in sides.items():
+        gmsh.model.addPhysicalGroup(1, curves, name=side)
+    gmsh.model.mesh.generate(2)
+    with TemporaryDirectory() as name:
+        gmsh.write(f"{name}/stamp.msh")
+        mesh = load_mesh(Path(name) / "stamp.msh", "mm")
+    gmsh.finalize()
+    upper = Part("stamp", mesh, STEEL, loads=(Plate("top", {"x": 50.0, "y": -500.0}),), contact="foot")
+    from contactopt.scenes.meshes import rename, tensor_mesh
+
+    ground = rename(tensor_mesh(np.linspace(-20, 20, 11), np.linspace(-15, 0, 5)), bottom="y-", top="y+")
+    lower = Part("block", ground, Material(70e3, 0.33), (Support("bottom"),), contact="top")
+    return Scene("stamp", upper, lower, 0.3)
+
+
+def effectivity() -> list[dict[str, Any]]:
+    """Estimated over true error, each scene and quantity at three accuracies."""
+    scenes: dict[str, tuple[Scene, tuple[str, ...]]] = {
+        "punch-2d": (make_scene("punch-2d"), ("energy", "approach")),
+        "cylinder-2d": (make_scene("cylinder-2d"), ("energy", "approach", "pressure")),
+        "sphere": (make_scene("sphere"), ("energy", "approach", "pressure")),
+        "pin-in-bush": (make_scene("pin-in-bush"), ("energy",)),
+        "press-fit": (make_scene("press-fit"), ("energy",)),
+        "cylinder from Gmsh": (cylinder(6.0, 1000.0)[0], ("energy", "approach", "pressure")),
+        "stamp from Gmsh": (stamp(8.0), ("energy", "approach")),
+        "tall stamp from Gmsh": (stamp(20.0), ("energy", "approach")),
+    }
+    rows = []
+    for name, (scene, quantities) in scenes.items():
+        for quantity in quantities:
+            best = refine_locally(scene, quantity, 1e-5, max_unknowns=30_000)[1]
+            for level in best.levels[1:]:
+                true = abs(level.value / best.extrapolated - 1)
+                if true > 5 * abs(best.value / best.extrapolated - 1) and level.unknowns < 8_000:
+                    rows.append(
+                        {
+                            "scene": name,
+                            "quantity": quantity,
+                            "unknowns": level.unknowns,
+                            "estimated": level.error,
+                            "true": true,
+                            "effectivity": level.error / true,
+                        }
+                    )
+    return rows
+
+
+def chart() -> list[dict[str, Any]]:
+    """Error of the peak pressure against processor seconds: a rigid cylinder on a block, a half-plane where that is enough."""
+    from contactopt.scenes.meshes import graded, rename, tensor_mesh
+
+    force, radius, rubber = 1.0, 400.0, RUBBER
+    exact = analytic.hertz_line(force, radius, analytic.contact_modulus(rubber))
+    a = exact.half_width
+    ball = Rigid("cylinder", gap=lambda p: p[0] ** 2 / (2 * radius), force={"y": -force})
+    rows = []
+
+    def block(mesh: Any) -> Scene:
+        part = Part("block", mesh, rubber, (Support("bottom"),), contact="top")
+        return Scene("cylinder", ball, part, 0.0, law="frictionless")
+
+    def measure(how: str, scene: Scene) -> None:
+        begin = time.process_time()
+        solved = solve_scene(scene)
+        value = peak_pressure(solved.reduction, solved.solution)
+        rows.append(_point(how, solved.reduction.dofs, value / exact.peak - 1, time.process_time() - begin))
+
+    size = 40 * a
+    for n in (64, 128, 256, 512):
+        grid = tensor_mesh(np.linspace(-size, size, n + 1), np.linspace(-size, 0, n // 2 + 1))
+        measure("uniform", block(rename(grid, bottom="y-", top="y+")))
+    for n in (4, 8, 16, 32):
+        h = a / n
+        side = np.concatenate([np.linspace(0, 1.5 * a, int(1.5 * n) + 1), 1.5 * a + graded(size - 1.5 * a, h, 1.2)[1:]])
+        grid = tensor_mesh(np.concatenate([-side[:0:-1], side]), -graded(size, h, 1.2)[::-1])
+        measure("graded by hand", block(rename(grid, bottom="y-", top="y+")))
+    coarse = tensor_mesh(np.linspace(-size, size, 17), np.linspace(-size, 0, 9))
+    for degree in (1, 2):
+        scene = replace(block(rename(coarse, bottom="y-", top="y+")), degree=degree)
+        for goal in (3e-2, 1e-2, 3e-3, 1e-3):
+            begin = time.process_time()
+            solved, estimate = refine_locally(scene, "pressure", goal, max_unknowns=60_000)
+            error = estimate.value / exact.peak - 1
+            rows.append(_point(f"adaptive, degree {degree}", solved.reduction.dofs, error, time.process_time() - begin))
+    for n in (32, 64, 128, 256, 512):
+        x = (np.arange(n) + 0.5) * 3 * a / n - 1.5 * a
+        plane = HalfSpace("block", rubber, x, depth=size)
+        measure("half-plane", Scene("cylinder", ball, plane, 0.0, law="frictionless"))
+    return rows
+
+
+def _point(how: str, unknowns: int, error: float, seconds: float) -> dict[str, Any]:
+    return {"mesh": how, "unknowns": unknowns, "error of the peak": abs(error), "processor seconds": seconds}
+
+
+PARTS: dict[str, Callable[[], list[dict[str, Any]]]] = {
+    "orders": orders,
+    "hertz": hertz,
+    "effectivity": effectivity,
+    "chart": chart,
+}
+
+
+def report(tables: dict[str, list[dict[str, Any]]]) -> None:
+    """The report from the tables of all parts."""
+    fits = []
+    for degree in (1, 2):
+        for mesh in ("adaptive", "uniform"):
+            rows = [row for row in tables["orders"] if row["degree"] == degree and row["mesh"] == mesh]
+            fits.append(
+                {
+                    "mesh": mesh,
+                    "degree": degree,
+                    "unknowns": f"{rows[0]['unknowns']} to {rows[-1]['unknowns']}",
+                    "order in the number of unknowns": slope(
+                        [row["unknowns"] for row in rows], [row["error in the energy norm"] for row in rows]
+                    ),
+                }
+            )
+    values = [row["effectivity"] for row in tables["effectivity"]]
+    good = sum(0.5 <= value <= 4 for value in values)
+    text = f"""{__doc__.split(chr(10))[0]}
+
+## The flat punch and its corners
+
+The stress is infinite at the edge of the punch. On even meshes that spoils the order of convergence; local refinement restores
+it, -1/2 for linear and -1 for quadratic elements in the number of unknowns. The error is that in the energy norm.
+
+{{fits}}
+
+## Hertz from meshes that know nothing of the contact
+
+A steel cylinder of radius 20 mm on a block, both meshed by Gmsh with triangles of 6 mm; the contact is 1 mm wide or less. The
+table names the first mesh from which on the error of the peak pressure stays within the bound.
+
+{{hertz}}
+
+## Is the estimate honest?
+
+Estimated over true error for {len(values)} meshes; {good} of them lie between .5 and 4. The true error is that to the
+extrapolated value of a much finer mesh of the same sequence.
+
+{{effectivity}}
+
+## Speed against accuracy
+
+A rigid cylinder on a block of 80 x 40 contact half-widths; the exact value is that of a half-plane.
+
+{{chart}}
+"""
+    write("adaptivity", "Fewest unknowns for an accuracy", text, tables | {"fits": fits}, {"error": picture(tables)})
+
+
+def picture(tables: dict[str, list[dict[str, Any]]]) -> Any:
+    """Error against unknowns for the punch, and against time for the chart."""
+    fig, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
+    for degree, color in ((1, "C0"), (2, "C1")):
+        for mesh, style in (("adaptive", "o-"), ("uniform", "s--")):
+            rows = [row for row in tables["orders"] if row["degree"] == degree and row["mesh"] == mesh]
+            x, y = [row["unknowns"] for row in rows], [row["error in the energy norm"] for row in rows]
+            left.loglog(x, y, style, color=color, mfc="none", label=f"{mesh}, degree {degree}")
+    left.set(xlabel="unknowns [-]", ylabel="error in the energy norm [-]", title="flat punch")
+    left.legend(frameon=False)
+    for number, mesh in enumerate(dict.fromkeys(row["mesh"] for row in tables["chart"])):
+        rows = [row for row in tables["chart"] if row["mesh"] == mesh]
+        x, y = [row["processor seconds"] for row in rows], [row["error of the peak"] for row in rows]
+        right.loglog(x, y, "o-", color=f"C{number}", mfc="none", label=mesh)
+    right.set(xlabel="processor time [s]", ylabel="error of the peak pressure [-]", title="cylinder on a block")
+    right.legend(frameon=False)
+    return fig
+
+
+def main(chosen: list[str]) -> None:
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    kept = FOLDER / "parts.json"
+    tables = json.loads(kept.read_text()) if kept.exists() else {}
+    for name in chosen or PARTS:
+        tables[name] = PARTS[name]()
+        print(name, *tables[name], sep="\n")
+        kept.write_text(json.dumps(tables, indent=1, default=float) + "\n")
+    if set(PARTS) <= set(tables):
+        report(tables)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

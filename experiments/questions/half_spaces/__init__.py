@@ -1,0 +1,1 @@
+"""What does a half-space cost, how exact is it, and when is it the wrong model?"""

@@ -1,0 +1,128 @@
+"""What does a half-space cost, and how exact is it: Hertz, Cattaneo-Mindlin, rough surfaces, against Tamaas?
+
+`TAMAAS=/path/to/python python -m experiments.questions.half_spaces` makes every table and the report; names of tables, as in
+`python -m experiments.questions.half_spaces hertz rough`, make these alone and the report from all that are there. Tamaas may live
+in an environment of its own; without TAMAAS this Python is used if it has Tamaas. Set OMP_NUM_THREADS=1.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+
+from experiments.questions.half_spaces.exact import cattaneo_rows, hertz_rows, kernel_rows
+from experiments.questions.half_spaces.measured import Row
+from experiments.questions.half_spaces.models import chart_rows, draw_limits, draw_speed, limit_rows
+from experiments.questions.half_spaces.rough import friction_rows, rough_rows, tamaas_rows, wavy_rows
+from experiments.report import REPORTS, write
+
+TABLES = {
+    "kernels": kernel_rows,
+    "hertz": hertz_rows,
+    "cattaneo": cattaneo_rows,
+    "wavy": wavy_rows,
+    "rough": rough_rows,
+    "friction": friction_rows,
+    "tamaas": tamaas_rows,
+    "chart": chart_rows,
+    "limits": limit_rows,
+}
+MISSING: list[Row] = [{"not measured": "run the command below with the name of this table"}]
+
+TEXT = """One thread per transform; CPU seconds of the process, on a machine on which other programs ran as well. "CPU s, problem" is the time
+to make the interface problem, "solve" that of contactopt.solve with its certificate.
+
+## Influence coefficients
+
+Coefficients of cells of 1 x .7 against adaptive quadrature of the point forces, the largest error of all six over the largest
+coefficient there.
+
+{kernels}
+
+## Hertz: a rigid sphere on a half-space
+
+The square of points is 2.5 contact radii wide. The peak is that of a parabola in r^2 through p^2 within half a radius, the width
+the zero of a line through p^2 beyond. The largest von Mises stress on the axis is .620 p0 at .481 a for nu = .3; it is that of a
+parabola through nine depths, on the points next to the axis.
+
+{hertz}
+
+## Cattaneo and Mindlin: two spheres, sheared to half of mu P
+
+Exact for nu = 0. For nu = .3 the same formulas neglect the friction across the shear; what is given is the deviation from them, which
+converges to a limit of its own, and the distance of both tractions to those with 128 points a radius. The loss is that of a cycle of
+16 steps.
+
+{cattaneo}
+
+## Rough surfaces
+
+A rigid rough surface (16 waves along a side at most, Hurst exponent .8, rms slope .1) at a mean pressure of .005 E*, not periodic;
+with friction sheared to half of mu P, mu = .3, all components coupled. Products, Newton steps and their iterations are those on the
+finest grid. Every row is made by a process of its own; "kB a point" is what its memory grew by.
+
+{wavy}
+
+The same with 64 waves along a side at most, without friction and with it:
+
+{rough}
+
+{friction}
+
+## Tamaas
+
+The same gap, load and tolerance, given to Tamaas' solver of Polonsky, Keer and Rey with its own stopping rule; both run one after
+the other. Both answers are judged by the certificate here. Tamaas' model holds what belongs to it before the solve.
+
+{tamaas}
+
+## Speed against accuracy, products against size
+
+{chart}
+
+## Where a half-space is wrong
+
+Finite elements over half-space: a block of 40 contact radii around the axis on a rigid floor under a rigid sphere, and an elastic half ball
+under a rigid plate on rigid ground. All have small displacements: for a / R beyond .3 these are an assumption of their own.
+
+{limits}
+"""
+
+
+def number(text: str) -> float | int | str:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            pass
+    return text
+
+
+def stored(name: str) -> list[Row]:
+    """The rows of a table as they were written last."""
+    path = REPORTS / "half_spaces" / f"{name}.csv"
+    if not path.exists():
+        return MISSING
+    with open(path, newline="") as file:
+        file.readline()
+        return [{key: number(value) for key, value in row.items()} for row in csv.DictReader(file)]
+
+
+def main() -> None:
+    wanted = sys.argv[1:] or list(TABLES)
+    unknown = [name for name in wanted if name not in TABLES]
+    if unknown:
+        raise SystemExit(f"there is no table {unknown[0]!r}; choose from {', '.join(TABLES)}.")
+    for name in wanted:
+        made = TABLES[name]() or [{"Tamaas": "not installed here: nothing compared"}]
+        tables = {other: stored(other) for other in TABLES} | {name: made}
+        figures = {}
+        if "model" in tables["chart"][0] and "products" in tables["wavy"][0]:
+            figures["speed"] = draw_speed(tables["chart"], tables["wavy"])
+        if "body" in tables["limits"][0]:
+            figures["limits"] = draw_limits(tables["limits"])
+        write("half_spaces", "Half-spaces: exactness, cost, and Tamaas", TEXT, tables, figures)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,173 @@
+"""Local refinement: meshes stay whole, curved boundaries curved; estimates agree with errors; unknowns go where they are needed."""
+
+import numpy as np
+import pytest
+import skfem
+from conftest import MATERIAL
+from turned import moved, turn
+
+from contactopt import InputError, Part, Rigid, Scene, Support, reduce, scenes, solve
+from contactopt.adaptivity import refine_locally
+from contactopt.adaptivity.estimate import element_errors
+from contactopt.analysis.solve_scene import solve_scene
+from contactopt.bodies.local_refinement import boundary_curve, divide, simplices
+from contactopt.scenes import make_scene
+
+NAMES = {"bottom": lambda x: x[-1] == 0, "corner": lambda x: (x[0] == 1) & (x[-1] < 0.4)}
+TICKS = np.linspace(0, 1, 4)
+MESHES = {
+    "triangles": skfem.MeshTri.init_tensor(TICKS, TICKS),
+    "quadrilaterals": skfem.MeshQuad.init_tensor(TICKS, TICKS),
+    "tetrahedra": skfem.MeshTet.init_tensor(TICKS, TICKS, TICKS),
+    "hexahedra": skfem.MeshHex.init_tensor(TICKS, TICKS, TICKS),
+}
+
+
+def measure(mesh, name=None):
+    """Size of a named boundary, or of the whole mesh."""
+    element = skfem.ElementTriP1() if isinstance(mesh, skfem.MeshTri) else skfem.ElementTetP1()
+    basis = skfem.Basis(mesh, element) if name is None else skfem.FacetBasis(mesh, element, facets=name)
+    return float(basis.dx.sum())
+
+
+@pytest.mark.parametrize("kind", list(MESHES))
+def test_divided_meshes_are_whole_and_keep_their_boundaries(kind):
+    random = np.random.default_rng(0)
+    mesh = simplices(MESHES[kind].with_boundaries(NAMES))
+    sizes = {name: measure(mesh, name) for name in NAMES}
+    assert sizes == pytest.approx({"bottom": 1.0, "corner": 1 / 3})
+    for _ in range(4):
+        count = mesh.nelements
+        mesh = divide(mesh, random.choice(count, 1 + count // 6, replace=False), {})
+        assert mesh.nelements > count and mesh.is_valid()
+        assert measure(mesh) == pytest.approx(1.0)
+        assert {name: measure(mesh, name) for name in NAMES} == pytest.approx(sizes)
+        inside = np.setdiff1d(np.arange(mesh.nfacets), mesh.boundary_facets())
+        assert np.all(mesh.f2t[1, inside] >= 0)  # no hanging nodes: every inner facet has two elements
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7, 2.5])
+def test_new_nodes_lie_on_the_curved_boundary(turn):
+    angle = np.linspace(0, np.pi, 9) + turn
+    disc = skfem.MeshTri.init_circle(3)
+    mesh = disc.with_boundaries({"arc": disc.boundary_facets()})
+    curve = boundary_curve(mesh, "arc")
+    between = 0.98 * np.array([np.cos(angle), np.sin(angle)])
+    assert np.allclose(np.linalg.norm(curve(between), axis=0), 1, atol=1e-5)
+    for _ in range(3):
+        mesh = divide(mesh, np.arange(0, mesh.nelements, 3), {"arc": curve})
+        nodes = np.unique(mesh.facets[:, mesh.boundaries["arc"]])
+        assert np.allclose(np.linalg.norm(mesh.p[:, nodes], axis=0), 1, atol=1e-5)
+
+
+def test_corners_stay_corners():
+    square = skfem.MeshTri.init_tensor(TICKS, TICKS)
+    assert boundary_curve(square.with_boundaries({"all": square.boundary_facets()}), "all") is None
+
+
+def pressed_block(n):
+    mesh = skfem.MeshTri.init_tensor(np.linspace(-1, 1, 2 * n + 1), np.linspace(0, 1, n + 1)).with_boundaries(
+        {"contact": lambda x: x[1] == 0, "top": lambda x: x[1] == 1}
+    )
+    block = Part("block", mesh, MATERIAL, supports=(Support("top"),))
+    return Scene("block", block, Rigid("floor", (0.0, 1.0), lambda x: x[0] ** 2 / 20 - 0.01), mu=0.3)
+
+
+def test_stress_errors_vanish_for_uniform_stress_and_fall_with_the_mesh():
+    body = reduce_body(pressed_block(4))
+    x, y = body.body.locations
+    linear = np.zeros(len(body.at_rest))
+    linear[body.body.unknowns] = np.array([0.1 * x + 0.2 * y, -0.3 * y])
+    assert np.abs(body.recovery_error(linear, linear)).max() < 1e-12
+    errors = []
+    for n in (8, 16, 32):
+        body = reduce_body(pressed_block(n))
+        x, y = body.body.locations
+        smooth = np.zeros(len(body.at_rest))
+        smooth[body.body.unknowns] = np.array([np.sin(x + y), x * y])
+        errors.append(body.recovery_error(smooth, smooth).sum())
+    assert errors[0] / errors[1] > 3 and errors[1] / errors[2] > 3  # the square of an error of first order
+
+
+def reduce_body(scene):
+    from contactopt.interface.reduction import reduce_bodies
+
+    return reduce_bodies(scene).bodies[0]
+
+
+@pytest.mark.parametrize("quantity", ["energy", "approach"])
+def test_the_estimate_agrees_with_the_error(quantity):
+    """Against the same quantity on a mesh that is four times as fine near the corner."""
+    scene = scenes.flat_punch(2, mu=0.5)
+    best = refine_locally(scene, quantity, 4e-4)[1]
+    coarse = refine_locally(scene, quantity, 8e-3)[1]
+    error = abs(best.extrapolated - coarse.value) / best.extrapolated
+    assert best.reached and coarse.reached
+    assert 0.5 < coarse.error / error < 4
+    assert abs(best.extrapolated - coarse.extrapolated) < 0.5 * abs(best.extrapolated - coarse.value)
+
+
+def test_unknowns_go_where_the_quantity_needs_them():
+    """For the peak pressure of Hertz the elements at the contact become small and the rest of the mesh stays as it is."""
+    scene = make_scene("cylinder-2d", mu=0.0)
+    solved, estimate = refine_locally(scene, "pressure", 5e-3)
+    assert estimate.reached and solved.solution.solved
+    assert estimate.value == pytest.approx(scene.reference.peak, rel=5e-3)
+    first, last = estimate.levels[0], estimate.levels[-1]
+    assert last.contacts >= 3 * first.contacts and last.unknowns < 2.5 * first.unknowns
+
+
+@pytest.mark.parametrize("angle", [30.0, 137.0])
+def test_a_turned_scene_is_refined_the_same(angle):
+    scene = pressed_block(4)
+    straight, turned = (refine_locally(each, "energy", 0.02)[1] for each in (scene, moved(scene, turn(angle))))
+    assert [level.unknowns for level in turned.levels] == [level.unknowns for level in straight.levels]
+    assert turned.value == pytest.approx(straight.value, rel=1e-9)
+
+
+def test_what_elements_add_is_the_whole_estimate():
+    errors = element_errors(solve_scene(pressed_block(6)), "energy")
+    marked = errors.marked(0.6)
+    sizes = np.abs(errors.bodies[0])
+    assert errors.total == pytest.approx(sizes.sum()) and len(errors.bodies[1]) == 0
+    assert sizes[marked[0]].sum() >= 0.6 * sizes.sum()
+    assert sizes[marked[0]].sum() - sizes[marked[0]].min() < 0.6 * sizes.sum()  # with one less it would not be enough
+
+
+def test_bounds_end_the_loop_with_the_best_answer():
+    scene = pressed_block(4)
+    solved, estimate = refine_locally(scene, "energy", 1e-9, max_unknowns=500)
+    assert solved.solution.solved and not estimate.reached and "500" in estimate.message
+    assert estimate.levels[-1].unknowns > 500 >= estimate.levels[-2].unknowns
+    _, estimate = refine_locally(scene, "energy", 1e-9, time_limit=0.0)
+    assert len(estimate.levels) == 1 and "time limit" in estimate.message
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [(("energy", 2.0), "accuracy"), (("heat", 0.1), "unknown quantity"), (("approach", 0.1), "no plate")],
+)
+def test_bad_input(arguments, words):
+    with pytest.raises(InputError, match=words):
+        refine_locally(pressed_block(2), *arguments)
+
+
+def test_solutions_on_refined_meshes_are_those_of_the_same_mesh():
+    solved, _ = refine_locally(pressed_block(4), "energy", 0.03)
+    again = solve(reduce(solved.reduction.scene))
+    assert np.allclose(again.reactions, solved.solution.reactions, atol=1e-6 * again.reactions.max())
+
+
+def test_run_takes_it_and_says_what_it_did(tmp_path, capsys):
+    from contactopt import run
+    from contactopt.cli import main
+
+    result = run("cylinder-2d", mu=0.0, accuracy=0.02, quantity="pressure", adaptive=True)
+    assert result.estimate.reached and result.summary["accuracy"]["levels"][-1]["contacts"] == result.problem.contacts
+    line = ["run", "punch-2d", "--accuracy", "0.02", "--quantity", "energy", "--adaptive", "--no-figures"]
+    assert main([*line, "--out", str(tmp_path / "out")]) == 0
+    assert "contacts" in capsys.readouterr().out
+    with pytest.raises(InputError, match="needs an aim"):
+        run("punch-2d", adaptive=True)
+    with pytest.raises(InputError, match="load path"):
+        run("cattaneo-2d", accuracy=0.1, quantity="energy", adaptive=True)

@@ -1,0 +1,128 @@
+"""The page of a result: what is on it is what was computed, it stands alone, and a browser can use it."""
+
+import base64
+import json
+import re
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from browser import CHROMIUM, Browser
+
+from contactopt import InputError, cli, run, scenes
+from contactopt.figures.page import certificate_words
+
+
+def decoded(packed):
+    kind = {"f4": "<f4", "i4": "<i4"}[packed["type"]]
+    return np.frombuffer(base64.b64decode(packed["data"]), kind).reshape(packed["shape"])
+
+
+def data_of(file):
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', file.read_text(), re.S)[1])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("cycle")
+    run(scenes.flat_punch(2, elements=4), made / "flat", figures=(), html=True)
+    run(scenes.flat_punch(3, elements=3), made / "solid", figures=(), html=True)
+    run("cattaneo-2d", made / "path", steps=2, elements=8, figures=(), html=True)
+    return made
+
+
+def test_the_bodies_on_the_page_are_those_of_the_result(folder):
+    result = run(scenes.flat_punch(3, elements=3))
+    data = data_of(folder / "solid" / "view.html")
+    for fields in result.fields:
+        (body,) = (body for body in data["bodies"] if body["name"] == fields.name)
+        points, cells = decoded(body["points"]), decoded(body["cells"])
+        surface = fields.mesh.p.T[np.unique(fields.mesh.facets[:, fields.mesh.boundary_facets()])]
+        assert np.allclose(np.sort(points, axis=0), np.sort(surface, axis=0), rtol=1e-6)
+        first, second, third = points[cells].transpose(1, 0, 2)
+        area = np.linalg.norm(np.cross(second - first, third - first), axis=1).sum() / 2
+        x, y, z = np.ptp(fields.mesh.p, axis=1)
+        assert area == pytest.approx(2 * (x * y + y * z + z * x), rel=1e-5)  # the whole surface of the block, once
+        assert decoded(body["values"]["von_mises"]).max() <= fields.von_mises.max() * (1 + 1e-6)
+        assert len(decoded(body["values"]["stress_xz"])) == len(points)
+
+
+def test_every_state_of_a_path_is_on_the_page(folder):
+    path = run("cattaneo-2d", steps=2, elements=8).path
+    data = data_of(folder / "path" / "view.html")
+    (pair,) = data["contacts"]
+    assert data["states"] == len(path.states)
+    for number, state in enumerate(path.states):
+        r, areas = state.solution.reactions, path.reduction.problem.areas
+        assert np.allclose(decoded(pair["states"]["pressure"])[number], r[:, 0] / areas, rtol=1e-5, atol=1e-9)
+        stick, slip = path.history["stick_nodes"][number], path.history["slip_nodes"][number]
+        status = decoded(pair["states"]["status"])[number]
+        assert (np.sum(status == 1), np.sum(status == 2)) == (stick, slip)
+        bound, along = (decoded(pair["states"][name])[number] for name in ("bound", "along"))
+        assert np.allclose(bound[status == 2], np.abs(along[status == 2]), rtol=1e-5)
+    assert np.allclose(data["history"]["shear_force"], path.history["shear_force"])
+
+
+def test_the_page_stands_alone_and_is_small(folder):
+    for file in folder.glob("*/view.html"):
+        text = file.read_text()
+        assert "default-src 'none'" in text and len(text) < 5e6
+        assert not re.search(r'(src|href)\s*=\s*"?(https?:)?//', text)
+
+
+def test_names_reach_the_page_as_text_only(tmp_path):
+    base = scenes.flat_punch(2, elements=4)
+    hostile = replace(base, name="</script><script>alert(1)</script>", units=("<b>", "<i>"))
+    run(hostile, tmp_path, figures=(), html=True)
+    text = (tmp_path / "view.html").read_text()
+    assert "<script>alert" not in text and "<b>" not in text and "</script><script>alert(1)" not in text
+    assert data_of(tmp_path / "view.html")["units"] == ["<b>", "<i>"]
+
+
+def test_view_makes_the_page_of_an_earlier_run(tmp_path, capsys, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    result = run(scenes.flat_punch(2, elements=4), tmp_path, figures=())
+    assert cli.main(["view", str(tmp_path)]) == 0 and "view.html" in capsys.readouterr().out
+    page = result.view(tmp_path / "other.html")
+    assert data_of(page) == data_of(tmp_path / "view.html") and len(opened) == 2
+    assert cli.main(["view", str(tmp_path / "nothing")]) == 2
+    assert "is not the folder of a finished run" in capsys.readouterr().err
+
+
+def test_without_plotly_a_sentence_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    monkeypatch.setattr("contactopt.figures.html.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"pip install 'contactopt\[view\]'"):
+        run(scenes.flat_punch(2, elements=4), tmp_path / "new", html=True)
+    assert not (tmp_path / "new").exists()
+
+
+def test_the_certificate_in_words_tells_a_solution_from_an_iterate():
+    solved = {"status": "solved", "residual": 1e-12, "message": ""}
+    assert certificate_words(solved).startswith("These forces are a solution. The certificate is 1.0e-12")
+    stopped = {"status": "stalled", "residual": 1e-3, "message": "it stalled"}
+    assert certificate_words(stopped).startswith("This is not a solution, only the last iterate (it stalled).")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+@pytest.mark.parametrize("name,width", [("path", 400)])
+def test_a_browser_shows_the_page_and_the_keyboard_turns_it(folder, name, width):
+    with Browser(folder / name / "view.html", width) as browser:
+        browser.wait("document.querySelectorAll('#contact-chart .main-svg').length > 0")
+        browser.ask("document.getElementById('peak').click()")
+        assert "pressure" in browser.ask("document.getElementById('values').innerText")
+        assert browser.ask("document.documentElement.scrollWidth <= window.innerWidth")
+        eye = "JSON.stringify(document.getElementById('view').layout.scene.camera)"
+        before = browser.ask(eye)
+        browser.ask("document.getElementById('view').focus()")
+        browser.press("ArrowLeft")
+        browser.wait(f"{eye} !== '{before}'")
+        if name == "path":
+            words = "document.getElementById('state-words').innerText"
+            browser.ask(
+                "const s = document.getElementById('state'); s.focus(); s.value = 0; s.dispatchEvent(new Event('input'))"
+            )
+            assert browser.ask(words).startswith("state 1 of ")
+        assert not browser.faults
