@@ -28,7 +28,7 @@ EQUAL = {
 }
 RANKS = (4, 8, 16)
 HEIGHTS = (80.0, 640.0)  # of the foundation that is cut into slices [mm]
-SLICED = 12  # elements across the contact half-width there
+SLICED = {4: 12, 8: 12, 16: 32}  # elements across the contact half-width there, by the number of ranks
 
 
 def equal_bodies(dim: int, elements: int) -> Scene:
@@ -133,7 +133,7 @@ def efficiency(team: Team, case: str) -> dict[str, Any]:
 
 def traffic(team: Team, height: float) -> dict[str, Any]:
     """One slice of the foundation, or the punch, on each rank: what a product with Q sends, and the answer."""
-    scene = sliced(scenes.flat_punch(2, elements=SLICED, foundation_height=height), "foundation", team.size - 1)
+    scene = sliced(scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height), "foundation", team.size - 1)
     one, many = (reduce_bodies(given, Q="implicit", solver="superlu") for given in (scene, spread(scene, team)))
     r = np.random.default_rng(0).normal(size=many.problem.q.size)
     expected = one.problem.Q @ r
@@ -157,7 +157,7 @@ def traffic(team: Team, height: float) -> dict[str, Any]:
 
 def coupled_traffic(team: Team, height: float) -> dict[str, Any]:
     """The same bodies solved by multigrid: what the whole solution sends."""
-    scene = sliced(scenes.flat_punch(2, elements=SLICED, foundation_height=height), "foundation", team.size - 1)
+    scene = sliced(scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height), "foundation", team.size - 1)
     problem = reduce(spread(scene, team), solver="multigrid")
     before = (team.traffic.messages, team.traffic.length)
     solution = solve(problem, "newton", tol=TOL)
