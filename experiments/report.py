@@ -67,11 +67,11 @@ def merged(name: str, table: str, rows: list[dict[str, Any]], keys: tuple[str, .
     with open(path, newline="") as file:
         old = list(csv.DictReader(line for line in file if not line.startswith("#")))
     new = {tuple(str(row[key]) for key in keys): row for row in rows}
-    kept = [{key: _number(value) for key, value in row.items()} for row in old]
+    kept = [{key: number(value) for key, value in row.items()} for row in old]
     return [new.pop(tuple(str(row[key]) for key in keys), row) for row in kept] + list(new.values())
 
 
-def _number(text: str) -> Any:
+def number(text: str) -> Any:
     for kind in (int, float):
         try:
             return kind(text)

@@ -6,7 +6,7 @@ import pytest
 from conftest import two_blocks
 from skfem import MeshQuad
 
-from contactopt import InputError, cli, run, scenes, solve
+from contactopt import Contact, InputError, Plate, Rigid, cli, run, scenes, solve
 from contactopt.analysis import accuracy
 from contactopt.analysis.accuracy import MOST_UNKNOWNS, refine, remainder
 from contactopt.analysis.quantities import QUANTITIES, at_rim, peak_pressure
@@ -14,7 +14,8 @@ from contactopt.analysis.zone import solve_zone
 from contactopt.bodies.refinement import split
 from contactopt.interface.reduction import reduce_bodies
 from contactopt.material import Material
-from contactopt.scenes.scene import Support
+from contactopt.scenes.meshes import rename, tensor_mesh
+from contactopt.scenes.scene import Part, Support
 from experiments.questions.accuracy.half_space import flat, indenter
 from experiments.questions.accuracy.measured import effectivity, exact
 
@@ -273,3 +274,26 @@ def test_hertz_within_a_thousandth_on_5000_unknowns(kind):
     assert reduction.dofs <= 5000
     for quantity in ("pressure", "width"):
         assert QUANTITIES[quantity](reduction, solution) == pytest.approx(exact(scene)[quantity], rel=1e-3)
+
+
+def test_a_quantity_of_one_of_several_pairs():
+    """A cylinder on a block, and elsewhere a block on a floor: the cylinder's pressure is Hertz's."""
+    round_one = scenes.cylinder(mu=0.0, force=30.0)
+    mesh = rename(tensor_mesh(np.linspace(0, 2, 3), np.linspace(0, 1, 3)), axis="x-", contact="y-", top="y+")
+    plate = Plate("top", {"y": -1.0}, glued=False)
+    block = Part("block", mesh, Material(5.0, 0.3), (Support("axis", {"x": 0.0}),), (plate,))
+    names = round_one.upper.name, round_one.lower.name
+    pairs = Contact(*names, 0.0), Contact("block", "floor", 0.3)
+    scene = replace(
+        round_one, upper=None, lower=None, mu=None, bodies=(*round_one.parts, block, Rigid("floor")), contacts=pairs
+    )
+    result = run(scene, accuracy=0.1, quantity="pressure:" + "-".join(names), figures=())
+    assert result.estimate.reached
+    assert result.estimate.value == pytest.approx(round_one.reference.peak, rel=0.02)
+    for wrong, message in (
+        ("pressure", "2 pairs of surfaces, each with its own pressure and half-widths; name the pair"),
+        ("pressure:a-b", "there is no pair of surfaces 'a-b'; the pairs are .*, block-floor"),
+        ("energy:block-floor", "the energy belongs to the whole scene"),
+    ):
+        with pytest.raises(InputError, match=message):
+            run(scene, accuracy=0.02, quantity=wrong, figures=())

@@ -120,12 +120,7 @@ def test_stability_map_and_its_thresholds():
     np.testing.assert_array_equal(figure.axes[0].get_images()[0].get_array(), [[1, 1, 0], [1, 1, 0]])
     (line,) = figure.axes[0].get_lines()
     np.testing.assert_allclose(line.get_xydata(), [[1, 0], [0, 1]])  # mu = 1 in the first row, .1 in the second
-    shown = (
-        figures.stability_map(rows, x="problem.nu", y="problem.elements", value="iterations")
-        .axes[0]
-        .get_images()[0]
-        .get_array()
-    )
+    shown = figures.stability_map(rows, value="iterations").axes[0].get_images()[0].get_array()
     assert np.ma.getmaskarray(np.ma.masked_invalid(shown))[:, 2].all() and shown[0, 0] == 7
 
 
@@ -306,7 +301,9 @@ def test_an_experiment_without_figures_gets_the_usual_ones_and_an_optional_one_m
     assert text.count("*Table ") == 2 and text.count("*Figure ") == 2
     extra = '\n[[figures]]\nkind = "success_table"\ncaption = "none"\nwhere = {setting = "nowhere"}\noptional = true\n'
     experiment = tmp_path / "out" / "experiment.toml"
-    experiment.write_text(experiment.read_text() + extra + extra.replace("nowhere", "mid").replace('"none"', '"some"'))
+    experiment.write_text(
+        experiment.read_text() + extra + extra.replace("nowhere", "default").replace('"none"', '"some"')
+    )
     assert main(["report", str(tmp_path / "out")]) == 0
     text = (tmp_path / "out" / "report.md").read_text()
     assert "some" in text and "none" not in text.partition("some")[0]

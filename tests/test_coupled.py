@@ -8,7 +8,7 @@ import pytest
 from contactopt import InputError, natural_map_residual, reduce, reduce_bodies, scenes, solve
 from contactopt.analysis import progress
 from contactopt.analysis.solve_scene import Options, solve_scene
-from contactopt.bodies.solvers.multigrid import conjugate_gradients
+from contactopt.bodies.solvers.multigrid import MultigridSolver, conjugate_gradients
 from contactopt.problem.certificate import Moved
 from contactopt.problem.laws import LAWS
 from contactopt.problem.laws.coulomb import Coulomb
@@ -39,6 +39,18 @@ def test_it_solves_every_law(law):
     expected, found = solve(dense, "newton", tol=1e-9), solve(coupled, "newton", tol=1e-9)
     assert found.solved
     assert np.abs(found.reactions - expected.reactions).max() < 1e-6 * np.abs(expected.reactions).max()
+
+
+@pytest.mark.parametrize("scene, elements", [(scenes.flat_punch(3), 4), (make_scene("stack"), 4)])
+def test_displacements_come_with_the_forces(scene, elements, monkeypatch):
+    """Plates, supports and bodies that float: what the method carried along is what solves with the bodies give."""
+    reduction = reduce_bodies(scene, elements, solver="multigrid")
+    solution = solve(reduction.problem, "newton", tol=1e-9)
+    assert solution.solved
+    anew = reduction.displaced(replace(solution, displacements=None))
+    monkeypatch.setattr(MultigridSolver, "solve", lambda *_: pytest.fail("a body was solved again"))
+    for found, expected in zip(reduction.displaced(solution), anew):
+        assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.2, 0.3, 0.4, 0.5])

@@ -109,7 +109,7 @@ def test_floating_bodies_are_in_equilibrium_inside(solver):
     """A U = loads + contact forces at every unknown of a body that nothing holds."""
     reduction = reduce_bodies(stack(2, 3, side=0.2), Q="implicit", solver=solver)
     solution = solve(reduction.problem, tol=1e-9)
-    moved = reduction.displaced(solution.reactions, solution.multipliers)
+    moved = reduction.displaced(solution)
     for body, B, U in zip(reduction.bodies, reduction.maps, moved):
         if body.fields(U) is not None:
             error = body.body.A @ U - body.body.load - B.T @ solution.reactions.ravel()
@@ -148,7 +148,7 @@ def test_multipliers_are_mean_displacements():
     reduction = reduce_bodies(stack(1, side=0.1, degree=2))
     solution = solve(reduction.problem, tol=1e-12)
     body = reduction.bodies[1]
-    U = reduction.displaced(solution.reactions, solution.multipliers)[1]
+    U = reduction.displaced(solution)[1]
     mean = body.body.rigid_motions.forces.T @ U
     assert np.allclose(mean, solution.multipliers, atol=1e-12)
 

@@ -5,6 +5,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,12 +17,13 @@ from scipy.sparse.linalg import spsolve
 import contactopt
 from contactopt import scenes
 from contactopt.bodies.body import build_body
-from contactopt.bodies.solvers import SOLVERS, choose, make_solver, multigrid, solver_type
+from contactopt.bodies.concurrency import Crew
+from contactopt.bodies.solvers import SOLVERS, choose, make_solver, multigrid, products, solver_type
 from contactopt.bodies.solvers.constants import FACTORS_UP_TO, PARDISO_FROM, RTOL
 from contactopt.bodies.solvers.multigrid import conjugate_gradients, near_neighbours, rigid_motions
 from contactopt.bodies.solvers.ordering import elimination_order, minimum_degree, nested_dissection
 from contactopt.bodies.solvers.products import SparseProduct
-from contactopt.bodies.solvers.system import System
+from contactopt.bodies.solvers.system import Block, System
 from contactopt.errors import BackendError, InputError
 
 
@@ -301,6 +303,41 @@ def test_sparse_products_are_those_of_scipy(form, precision):
     y = SparseProduct(A) @ x
     assert y.dtype == precision
     assert np.linalg.norm(y - A @ x) <= 10 * np.finfo(precision).eps * np.linalg.norm(abs(A) @ abs(x))
+
+
+@pytest.mark.parametrize("form", ["csr", "bsr"])
+def test_threads_share_products_without_a_trace(form, monkeypatch):
+    """The product is the same to the last digit, and the pieces of the matrix are no copies."""
+    monkeypatch.setattr(products, "LARGE", 1)
+    A = BODIES["solid foundation"].A
+    n = A.shape[0] // 3 * 3
+    A = A[:n][:, :n] if form == "csr" else A[:n][:, :n].tobsr((3, 3))
+    x = np.random.default_rng(0).standard_normal(n)
+    shared = SparseProduct(A, Crew(3))
+    assert np.array_equal(shared @ x, SparseProduct(A) @ x)
+    assert all(np.shares_memory(A.data, piece.matrix.data) for piece in shared._pieces)
+    P = sp.random_array((n, 40), density=0.1, rng=np.random.default_rng(0)).toarray()
+    coarse = products.galerkin(sp.bsr_matrix(P, blocksize=(3, 5)), A.tobsr((3, 3)), Crew(3))
+    assert np.allclose(coarse.toarray(), P.T @ (A @ P), atol=1e-12 * abs(A).max())
+
+
+def test_a_crew_does_everything_once_and_reports_failures():
+    done = []
+    Crew(4).each([partial(done.append, i) for i in range(50)])
+    assert sorted(done) == list(range(50))
+    with pytest.raises(ZeroDivisionError):
+        Crew(2).each([lambda: 1 // 0] * 5)
+
+
+def test_a_block_is_the_matrix_without_the_other_rows():
+    """Multigrid for a Block, which copies nothing, is multigrid for the rows and columns themselves."""
+    pytest.importorskip("pyamg")
+    A, *rest = BODIES["solid punch"]
+    n = A.shape[0]
+    whole = sp.csr_matrix(sp.block_diag([np.eye(2), A, np.eye(3)]))
+    block = System(Block(whole, np.arange(2, n + 2)), *rest)
+    b = np.random.default_rng(0).standard_normal(n)
+    assert np.array_equal(made("multigrid", block).solve(b), made("multigrid", System(A, *rest)).solve(b))
 
 
 def test_names_that_do_not_exist():

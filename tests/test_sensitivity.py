@@ -202,6 +202,16 @@ def test_at_a_kink_the_two_sides_differ():
     assert np.allclose(sensitivity.forward(q=np.array([[1.0, 0.0]])).reactions, 0.0)
 
 
+def test_at_the_apex_the_derivative_is_a_contact_problem_of_its_own():
+    """Without any force the problem looks the same in all scales: its derivative along d is the solution for q = d."""
+    Q = np.array([[1.0, 0.4], [0.4, 1.2]])
+    nothing = InterfaceProblem(Q, [[0.0, 0.0]], 0.5)
+    apex = contactopt.sensitivity(nothing, Solution(np.zeros((1, 2)), np.zeros(0), Status.SOLVED, 0.0, 0, "exact"))
+    for d in ([[-1.0, 0.9]], [[-1.0, -2.0]], [[-2.0, -1.1]], [[1.0, 0.3]]):
+        found = apex.forward(q=np.array(d)).reactions
+        assert np.allclose(found, solve(InterfaceProblem(Q, d, 0.5), tol=1e-12).reactions)
+
+
 def test_units_do_not_matter():
     problem = random_problem(4, 3)
     solution = solve(problem, tol=1e-12)

@@ -12,7 +12,7 @@ from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Supp
 from contactopt.problem.chart import Chart
 from contactopt.scenes.meshes import graded
 from contactopt.solving.preconditioners import deflated, preconditioner, smooth_motions
-from contactopt.solving.preconditioners.surface import inverse_root, surface_matrices
+from contactopt.solving.preconditioners.surface import divergences, inverse_root, surface_matrices
 
 POISSON = 0.3
 
@@ -165,10 +165,8 @@ def test_numbering_and_units_do_not_matter():
     assert np.allclose(R / np.trace(R), P[np.ix_(rows, rows)] / np.trace(P), atol=1e-9)
 
 
-@pytest.mark.parametrize("ratio", [1e-4, 1.0, 1e4])
-def test_a_pin_in_a_bush(ratio):
-    """A closed contact line in the plane: the rigid motions of the pin against the bush are deflated."""
-    n = 64
+def pin_in_bush(n, ratio):
+    """A closed contact line of n nodes in the plane, the pin held inside and the bush outside."""
     angle, rise = 2 * np.pi * np.arange(n) / n, graded(1.0, 2 * np.pi / n, 1.3)
 
     def part(name, radii, material, far):
@@ -187,9 +185,57 @@ def test_a_pin_in_a_bush(ratio):
 
     pin = part("pin", 1 - 0.8 * rise[::-1], Material(1.0, POISSON), 0.2)
     bush = part("bush", 1 + rise, Material(ratio, POISSON), 2.0)
-    problem = reduce(Scene("bush", pin, bush, 0.5), Q="explicit")
+    return reduce(Scene("bush", pin, bush, 0.5), Q="explicit")
+
+
+@pytest.mark.parametrize("ratio", [1e-4, 1.0, 1e4])
+def test_a_pin_in_a_bush(ratio):
+    """The rigid motions of the pin against the bush are deflated."""
+    problem = pin_in_bush(64, ratio)
     P = deflated(preconditioner(problem, "laplacian"), problem.Q, smooth_motions(problem))
     assert condition(P, problem.Q) < 5
+
+
+@pytest.mark.parametrize("name", ["p21", "p22", "neumann", "laplacian"])
+def test_on_a_closed_curve_the_circulant_is_exact(name):
+    """Q of a pin in a bush is a circulant of 2 x 2 blocks, P is one too: they have the same eigenvectors, none is extended.
+
+    Matrices of the normal components commute, and the condition number does not grow with the number of nodes.
+    """
+    found = []
+    for n in (32, 64):
+        problem = pin_in_bush(n, 3.0)
+        order = problem.chart.order()
+        at = (2 * order[:, None] + np.arange(2)).ravel()
+        P = (preconditioner(problem, name) @ np.eye(2 * n))[np.ix_(at, at)]
+        Q = problem.Q[np.ix_(at, at)]
+        for M, limit in ((Q, 1e-7), (P, 1e-6)):
+            around = np.roll(M, (2, 2), axis=(0, 1))
+            assert np.abs(around - M).max() < limit * np.abs(M).max()
+        both = P[::2, ::2] @ Q[::2, ::2]
+        assert np.abs(both - both.T).max() < 1e-6 * np.abs(both).max()
+        waves = np.fft.fft(P[::2, 0]).real * np.fft.fft(Q[::2, 0]).real  # the eigenvalues of P Q, wave by wave
+        found.append(waves[2:-1].max() / waves[2:-1].min())  # rigid motions are left out
+    assert found[1] < 1.2 * found[0] < 10
+
+
+def test_tangential_waves_along_their_direction_meet_more_resistance():
+    """The plane waves of `grad u : grad v + ALONG div u div v` on a large square, far from its edges."""
+    mesh = MeshTri.init_tensor(*[np.linspace(0, 1, 33)] * 2)
+    x = mesh.p
+    D = divergences(x, x, mesh.t)
+    K = surface_matrices(x, mesh.t)[0]
+    wave = np.sin(2 * np.pi * x[0])
+    along, across = (np.stack([a * wave, b * wave], axis=1).ravel() for a, b in ((1, 0), (0, 1)))
+    assert along @ D @ along == pytest.approx(wave @ K @ wave, rel=1e-12)  # the divergence is the whole gradient
+    assert across @ D @ across == pytest.approx(0.0, abs=1e-9)
+    turned = np.array([[0.6, -0.8], [0.8, 0.6]])
+    u = np.random.default_rng(0).normal(size=(x.shape[1], 2))
+    same = divergences(turned @ x, turned @ x, mesh.t)
+    assert (u @ turned.T).ravel() @ same @ (u @ turned.T).ravel() == pytest.approx(u.ravel() @ D @ u.ravel())
+    torn = x.copy()
+    torn[0] *= 3.0  # a chart that has lost the lengths
+    assert not divergences(x, torn, mesh.t).data.any()
 
 
 def test_a_surface_without_cells_is_refused():

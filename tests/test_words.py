@@ -52,11 +52,11 @@ def test_the_grammar_of_a_diagnosis_agrees_with_its_numbers():
 def test_a_path_says_how_many_states_there_are():
     said = []
     path = follow(scenes.growing_indentation(steps=2, elements=6), note=said.append)
-    assert [text.partition(":")[0] for text in said] == ["state 1 of 2", "state 2 of 2"]
+    assert [text.partition(":")[0] for text in said if text.startswith("state")] == ["state 1 of 2", "state 2 of 2"]
     assert "2 states" in repr(path) and len(path._repr_html_()) < 1000
     said.clear()
     follow((state for state in scenes.growing_indentation(steps=2, elements=6)), note=said.append)
-    assert said[-1].startswith("state 2: ")
+    assert [text for text in said if text.startswith("state")][-1].startswith("state 2: ")
 
 
 def test_a_component_of_another_kind_names_that_kind():

@@ -31,7 +31,8 @@ import numpy as np
 from contactopt.analysis.constants import BELOW, FIRST, MOST_MEMORY, MOST_UNKNOWNS, SLOWEST, STUCK
 from contactopt.analysis.paths import solve_states
 from contactopt.analysis.progress import resident_memory
-from contactopt.analysis.quantities import QUANTITIES, at_rim, uncertainty
+from contactopt.analysis.quantities import OF_ONE_PAIR, QUANTITIES, at_rim, uncertainty
+from contactopt.analysis.resultants import views
 from contactopt.analysis.solve_scene import Options, Solved
 from contactopt.bodies.refinement import split_scene
 from contactopt.checks import check_number
@@ -133,7 +134,7 @@ def refine(
     Parameters
     ----------
     states : the scene, or the states of its load path
-    quantity : a name in QUANTITIES
+    quantity : a name in QUANTITIES; of one of several pairs of surfaces 'NAME:PAIR', such as 'pressure:block-floor'
     accuracy : bound on the estimated relative error of the quantity, between 0 and 1
     options : how each mesh is solved
 
@@ -142,8 +143,15 @@ def refine(
     InputError : for an unknown quantity or an accuracy out of range
     """
     options = options or Options()
-    if quantity not in QUANTITIES:
+    name, _, pair = quantity.partition(":") if isinstance(quantity, str) else (quantity, "", "")
+    if name not in QUANTITIES:
         raise InputError(f"unknown quantity {quantity!r}; choose from {', '.join(QUANTITIES)}.")
+    if pair and pair not in (known := [made.name for made in states[0].pairs]):
+        raise InputError(
+            f"quantity {quantity!r}: there is no pair of surfaces {pair!r}; the pairs are {', '.join(known)}."
+        )
+    if pair and name not in OF_ONE_PAIR:
+        raise InputError(f"the {name} belongs to the whole scene; of one pair ask for {', '.join(OF_ONE_PAIR)}.")
     check_number("the accuracy", accuracy, low=0.0, high=1.0)
     search = _Search(tuple(states), quantity, options)
     while True:
@@ -212,7 +220,8 @@ class _Search:
         scene = states[-1]
         self.given = scene.given
         self.first = scene.elements if self.given else max(FIRST[scene.dim], scene.elements // BELOW)
-        self.best = 2 if quantity in EDGES else 2 * scene.degree
+        self.name, _, self.pair = quantity.partition(":")
+        self.best = 2 if self.name in EDGES else 2 * scene.degree
         self.levels: list[Level] = []
         self.meshes: list[Level] = []
         self.changes: list[float] = []
@@ -247,7 +256,7 @@ class _Search:
         assert self.last is not None
         if self.last.failure:
             return self.last.failure
-        if self.quantity == "pressure" and at_rim(self.last.reduction, self.last.solution):
+        if self.name == "pressure" and at_rim(*self._seen(self.last.reduction, self.last.solution)):
             return "the largest pressure is at the edge of the contact surface, a corner, where no mesh bounds it"
         steps = np.diff([level.value for level in self.meshes])
         if len(steps) > 2 and np.all(steps[-2:] * np.sign(steps[-1]) > 2**-STUCK * np.abs(steps[-3:-1])):
@@ -314,6 +323,13 @@ class _Search:
             self.share = self.split_last.level.unknowns / self.meshes[-1].unknowns
         self.changes[splits - 1 :] = [self.split_last.level.value - known[elements, splits - 1]]
 
+    def _seen(self, reduction: Reduction, solution: Solution) -> tuple[Reduction, Solution]:
+        """What the quantity is read from: all of the scene, or one pair by itself."""
+        if not self.pair:
+            return reduction, solution
+        names = [pair.name for pair in reduction.problem.pairs]
+        return views(reduction, solution)[names.index(self.pair)]
+
     def _solve(self, elements: int, splits: int) -> Mesh:
         self.options.note(f"{elements} elements across the half-width" + (f", {splits} splits" if splits else ""))
         begin = time.perf_counter()
@@ -321,7 +337,8 @@ class _Search:
         states = [split_scene(scene, base, splits) for scene in self.states]
         solved = solve_states(states, elements, self.options, None if self.last is None else self.last.solved)
         reduction, solution, zones = solved.reduction, solved.solution, solved.zones
-        value = QUANTITIES[self.quantity](reduction, solution), uncertainty(self.quantity, reduction, solution)
+        seen = self._seen(reduction, solution)
+        value = QUANTITIES[self.name](*seen), uncertainty(self.name, *seen)
         size = reduction.dofs, reduction.problem.contacts, max(1, len(zones) - 1), zones[-2] if zones else None
         self.levels.append(Level(elements, splits, *size, *value, time.perf_counter() - begin))
         self.each = (resident_memory() - self.before) / (self._held() + reduction.dofs)

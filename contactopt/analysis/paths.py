@@ -252,7 +252,7 @@ def _state(solved: Solved, before: State | None, last: _Mechanics | None) -> tup
     gap[:, 0] = reduction.gap
     if before is not None:
         earlier[:, 1:] = before.displacements[:, 1:]
-    U = list(reduction.displaced(r, solution.multipliers))
+    U = list(reduction.displaced(solution))
     F = [body.external_forces(own) for body, own in zip(reduction.bodies, U)]
     elastic = sum(body.energy(own) for body, own in zip(reduction.bodies, U))
     now = _Mechanics(r, problem.displacements(r, solution.multipliers) + earlier, U, F, elastic)

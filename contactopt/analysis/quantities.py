@@ -22,7 +22,20 @@ if TYPE_CHECKING:
 
 
 def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
-    """How far the plates bring the bodies together along the mean normal [length]; None without a plate."""
+    """How far the plates bring the bodies together along the mean normal.
+
+    Parameters
+    ----------
+    problem
+        An interface problem.
+    solution
+        Of the problem.
+
+    Returns
+    -------
+    float or None
+        [length]; None without a plate.
+    """
     if len(solution.multipliers) == 0:
         return None
     normal = (problem.V @ solution.multipliers).reshape(problem.q.shape)[:, 0]
@@ -30,18 +43,49 @@ def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
 
 
 def elastic_energy(reduction: Reduction, solution: Solution) -> float:
-    """Elastic energy of all bodies together, the sum of U' A U / 2 [force length]."""
-    displaced = reduction.displaced(solution.reactions, solution.multipliers)
+    """Elastic energy of all bodies together, the sum of U' A U / 2.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    float
+        [force length].
+    """
+    displaced = reduction.displaced(solution)
     return sum(body.energy(U) for body, U in zip(reduction.bodies, displaced))
 
 
 def peak_pressure(reduction: Reduction, solution: Solution) -> float:
-    """Largest value of a smooth pressure [stress].
+    """Largest value of a smooth pressure.
 
     The square of the pressure is quadratic under Hertz's ellipse. A polynomial is fitted to it about the node of the
-    largest pressure, up to half-way to the edge, weighted by the nodal areas. That removes the error of the single node,
-    which is large on the axis of an axisymmetric mesh: the strain u_r / r is poorly resolved there, on a ring without area.
-    The nodal value itself is returned at the rim of the contact surface, and where the fit has too few nodes.
+    largest pressure, up to half-way to the edge, weighted by the nodal areas. That removes the error of the single
+    node. This error is large on the axis of an axisymmetric mesh, because the strain u_r / r is poorly resolved
+    there, on a ring without area. At the rim of the contact surface, and where the fit has too few nodes, the largest
+    nodal value is returned.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene with one pair of surfaces.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    float
+        [stress].
+
+    Raises
+    ------
+    InputError
+        If the scene has several pairs of surfaces.
     """
     _one_pair(reduction)
     problem = reduction.problem
@@ -67,6 +111,17 @@ def at_rim(reduction: Reduction, solution: Solution) -> bool:
     """Whether the largest pressure is at the rim of the candidate surface: a corner, where it is infinite.
 
     A node inside has neighbours in all directions.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene with one pair of surfaces.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    bool
     """
     offsets = _around_the_peak(reduction.problem, solution)[0]
     distance = np.linalg.norm(offsets, axis=0)
@@ -87,13 +142,49 @@ def _around_the_peak(problem: InterfaceProblem, solution: Solution) -> tuple[np.
 
 
 def width(reduction: Reduction, solution: Solution) -> float:
-    """Half-width of the contact zone [length], as contact_edge() reads it."""
+    """Half-width of the contact zone, as contact_edge() reads it.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene with one pair of surfaces.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    float
+        [length].
+
+    Raises
+    ------
+    InputError
+        If the scene has several pairs of surfaces.
+    """
     _one_pair(reduction)
     return contact_edge(reduction.scene, reduction.problem, solution.reactions)
 
 
 def stick_width(reduction: Reduction, solution: Solution) -> tuple[float, float]:
-    """Half-width of the stick zone and its uncertainty [length], as stick_edge() reads them from this solution."""
+    """Half-width of the stick zone, as stick_edge() reads it from this solution.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene with one pair of surfaces.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    (float, float)
+        The half-width and its uncertainty [length].
+
+    Raises
+    ------
+    InputError
+        If the scene has several pairs of surfaces.
+    """
     _one_pair(reduction)
     problem = reduction.problem
     slip = problem.displacements(solution.reactions, solution.multipliers)[:, 1:]
@@ -105,12 +196,32 @@ def _one_pair(reduction: Reduction) -> None:
     if len(reduction.problem.pairs) > 1:
         raise InputError(
             f"scene '{reduction.scene.name}' has {len(reduction.problem.pairs)} pairs of surfaces, each with its own pressure and "
-            "half-widths; ask for the energy, or read them by pair (contactopt.analysis.resultants)."
+            "half-widths; name the pair, as in 'pressure:"
+            + reduction.problem.pairs[0].name
+            + "', or ask for the energy."
         )
 
 
 def stick_ratio(reduction: Reduction, solution: Solution) -> tuple[float, float]:
-    """Half-width of the stick zone over that of contact [-], and its uncertainty: read between nodes."""
+    """Half-width of the stick zone over that of contact.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene with one pair of surfaces.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    (float, float)
+        The ratio and its uncertainty, since it is read between nodes [-].
+
+    Raises
+    ------
+    InputError
+        If the scene has several pairs of surfaces.
+    """
     edge = width(reduction, solution)
     stick, uncertainty = stick_width(reduction, solution)
     return (stick / edge, uncertainty / edge) if edge > 0 else (0.0, 0.0)
@@ -124,7 +235,22 @@ def _approach(reduction: Reduction, solution: Solution) -> float:
 
 
 def uncertainty(name: str, reduction: Reduction, solution: Solution) -> float:
-    """Half the difference between two readings of a quantity, in its unit; zero where it has only one reading."""
+    """Half the difference between two readings of a quantity.
+
+    Parameters
+    ----------
+    name
+        Of the quantity.
+    reduction
+        A reduced scene.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    float
+        In the unit of the quantity; 0 where it has only one reading.
+    """
     return stick_ratio(reduction, solution)[1] if name == "stick" else 0.0
 
 
@@ -136,3 +262,4 @@ QUANTITIES: dict[str, Callable[[Reduction, Solution], float]] = {
     "stick": lambda *solved: stick_ratio(*solved)[0],
     "energy": elastic_energy,
 }
+OF_ONE_PAIR = ("pressure", "width", "stick")  # these belong to a surface, not to the scene as a whole

@@ -76,7 +76,7 @@ def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Res
     """For every support and plate, as "body 'name', support 'boundary'", the resultant of its forces on the body."""
     ring, planes = reduction.scene.kind == "axisymmetric", planes_of(reduction)
     found = {}
-    displaced = reduction.displaced(solution.reactions, solution.multipliers)
+    displaced = reduction.displaced(solution)
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
         for name, (points, forces) in body.held_by(U, B.T @ solution.reactions.ravel()).items():
             found[f"body '{body.name}', {name}"] = resultant(points, forces, ring, planes)

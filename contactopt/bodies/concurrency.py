@@ -1,10 +1,14 @@
-"""The one place where bodies work at the same time."""
+"""The one place where threads share work: bodies beside each other, and the pieces of one large product."""
 
 from __future__ import annotations
 
+import os
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
+
+from contactopt.problem.threads import cores
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -25,3 +29,35 @@ def each(
         running = [pool.submit(act, item) if mark else None for item, mark in zip(listed, marked)]
         here = [act(item) if future is None else None for item, future in zip(listed, running)]
         return tuple(done if future is None else future.result() for future, done in zip(running, here))  # type: ignore[misc]
+
+
+class Crew:
+    """Threads that help with pieces of one caller's work, one for each core but the caller's own. They sleep in between.
+
+    The threads start with the first piece and end with the object. A forked process makes its own.
+    """
+
+    def __init__(self, size: int | None = None):
+        self.size = cores() if size is None else size
+        self._pool: ThreadPoolExecutor | None = None
+        self._process = os.getpid()
+
+    def each(self, acts: Sequence[Callable[[], None]]) -> None:
+        """Do all of them, in any order. Whoever is free takes the next one, so that a busy machine costs no waiting."""
+        waiting = deque(acts)
+
+        def work() -> None:
+            while waiting:
+                try:
+                    act = waiting.popleft()
+                except IndexError:  # another thread took the last one
+                    return
+                act()
+
+        if self._pool is None or self._process != os.getpid():
+            self._process, self._pool = os.getpid(), ThreadPoolExecutor(max(self.size - 1, 1), "crew")
+        helping = [self._pool.submit(work) for _ in range(min(self.size, len(acts)) - 1)]
+        work()
+        for future in helping:
+            if not future.cancel():
+                future.result()

@@ -20,6 +20,7 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,7 +30,7 @@ from contactopt.bodies.elements import face_nodes
 from contactopt.bodies.fields import Fields, fields_of, recovery_error
 from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
 from contactopt.bodies.solvers import make_solver, solver_type
-from contactopt.bodies.solvers.system import BodySolver, System
+from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.errors import InputError
 from contactopt.problem.operators import Product
 from contactopt.scenes.scene import Part, Scene
@@ -146,8 +147,13 @@ class ElasticBody:
         size = np.asarray(abs(T[:, self.interface]).sum(axis=1)).ravel() + np.abs(self._low_rank(T)[1]).sum(axis=1)
         return np.asarray(size > 0)
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> np.ndarray:
         """U of all unknowns, eq (13) of the paper."""
+        if free is not None and self.equilibrium is not None:
+            left, right = self.equilibrium.low_rank
+            U = self.at_rest + self.motions @ multipliers + left @ (right.T @ force)
+            U[self.equilibrium.free] += free
+            return np.asarray(U)
         U = self.at_rest + self.elastic_modes @ (self.elastic_modes.T @ force) + self.motions @ multipliers
         return np.asarray(U + self.relieved(force))
 
@@ -316,7 +322,8 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     kept = np.setdiff1d(body.free, body.rigid_motions.fixing)
     place[kept] = np.arange(len(kept))
     interface = np.intersect1d(body.contact_dofs, kept)
-    A = body.A[kept][:, kept]
+    iterative = solver_type(solver, len(kept), len(dofs)).iterative
+    A = Block(body.A, kept) if iterative else body.A[kept][:, kept]
     trailing = place[interface] if entries else None
     made = make_solver(solver, System(A, node[kept], component[kept], body.locations, trailing))
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)

@@ -216,8 +216,11 @@ class Body(Protocol):
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
         """Mask (rows,) of the rows of T C T' that are not zero: what the body's compliance moves."""
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """U (n,) under contact forces (n,) and multipliers (p,)."""
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> np.ndarray:
+        """U (n,) under contact forces (n,) and multipliers (p,).
+
+        `free` are the unknowns of `equilibrium` under these forces, where they are known; they are not solved for again then.
+        """
 
     def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of U (n,) and of the balance of the free motions (p,) by the material's constant 'E' or 'nu'.

@@ -201,8 +201,8 @@ def _moved(own: Resident, T: sp.csr_matrix) -> np.ndarray:
     return own.body.moved(own.wide(T))
 
 
-def _displacement(own: Resident, F: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-    return own.body.displacement(own.force(F), multipliers)
+def _displacement(own: Resident, F: np.ndarray, multipliers: np.ndarray, free: np.ndarray | None) -> np.ndarray:
+    return own.body.displacement(own.force(F), multipliers, free)
 
 
 def _energy(own: Resident, U: np.ndarray) -> float:
@@ -350,8 +350,9 @@ class RemoteBody:
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
         return np.asarray(self._ask(_moved, T))
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> Any:
-        return Field(self.team, self._keep(_displacement, force, multipliers))
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> Any:
+        known = None if free is None else free.kept
+        return Field(self.team, self._keep(_displacement, force, multipliers, known))
 
     def energy(self, U: Any) -> float:
         return float(self._ask(_energy, U.kept))

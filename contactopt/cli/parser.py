@@ -6,6 +6,7 @@ import argparse
 
 import contactopt
 from contactopt.analysis.quantities import QUANTITIES
+from contactopt.benchmark.keys import help_text
 from contactopt.bodies.solvers import SOLVERS
 from contactopt.cli import commands
 from contactopt.figures.style import FORMATS
@@ -86,7 +87,11 @@ def _run(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--accuracy", type=float, metavar="X", help="refine until the quantity's relative error is below X"
     )
-    run.add_argument("--quantity", metavar="NAME", help="what --accuracy bounds: " + ", ".join(QUANTITIES))
+    run.add_argument(
+        "--quantity",
+        metavar="NAME",
+        help="what --accuracy bounds: " + ", ".join(QUANTITIES) + "; of one pair NAME:PAIR",
+    )
     run.add_argument("--adaptive", action="store_true", help="refine only where the quantity needs it")
     run.add_argument(
         "--ranks", type=int, metavar="N", help="processes among which the bodies are dealt out (needs mpi4py)"
@@ -102,7 +107,9 @@ def _run(run: argparse.ArgumentParser) -> None:
 
 
 def _bench(bench: argparse.ArgumentParser) -> None:
-    bench.add_argument("file", metavar="FILE", help="experiment, TOML (see contactopt.benchmark)")
+    bench.formatter_class = argparse.RawDescriptionHelpFormatter
+    bench.epilog = help_text()
+    bench.add_argument("file", metavar="FILE", help="experiment, a TOML file whose keys are listed below")
     bench.add_argument("--out", metavar="DIR", help="where results go (default: out/bench/NAME)")
     bench.add_argument("--jobs", type=int, metavar="N", help="worker processes (one per core)")
     bench.add_argument("--resume", action="store_true", help="go on with an interrupted campaign")

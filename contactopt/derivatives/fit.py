@@ -90,9 +90,9 @@ class _Model:
     """The quantities of a path as functions of the parameters, with warm starts and the certificates of all states visited."""
 
     def __init__(
-        self, scenes: tuple[Scene, ...], which: tuple[Parameter, ...], data: dict[str, np.ndarray], tol: float
+        self, scenes: tuple[Scene, ...], which: tuple[Parameter, ...], data: dict[str, np.ndarray], Q: str, tol: float
     ):
-        self.scenes, self.which, self.data, self.tol = scenes, which, data, tol
+        self.scenes, self.which, self.data, self.Q, self.tol = scenes, which, data, Q, tol
         self.measured = {name: np.flatnonzero(np.isfinite(values)).tolist() for name, values in data.items()}
         self.last: tuple[np.ndarray, Chain] | None = None
         self.certificates: list[float] = []
@@ -106,7 +106,7 @@ class _Model:
         base = None
         if self.last is not None and not any(one.kind in ("E", "nu") for one in self.which):
             base = self.last[1].steps[0].reduction
-        made = solved_chain(scenes, self.tol, base, starts)
+        made = solved_chain(scenes, self.tol, base, starts, self.Q)
         self.last = values.copy(), made
         self.certificates.append(max(step.solution.residual for step in made.steps))
         return made
@@ -140,6 +140,7 @@ def fit(
     noise: float | Mapping[str, float] | None = None,
     start: Mapping[str, float] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    Q: str = "auto",
     tol: float = 1e-10,
     evaluations: int = 60,
 ) -> Fit:
@@ -155,6 +156,7 @@ def fit(
         the model leaves, for all quantities relative to the size of their data
     start : name -> first value; by default that of the scene
     bounds : name -> (lowest, highest) value; by default what makes sense for E, nu and mu
+    Q : form of Q, as for contactopt.reduce
     tol : bound on the certificate of every state
     evaluations : of the model, at most
 
@@ -180,7 +182,7 @@ def fit(
     known = _data(data, len(scenes))
     first = _first(which, scenes, start or {})
     sigma = _noise(noise, known)
-    model = _Model(scenes, which, known, tol)
+    model = _Model(scenes, which, known, Q, tol)
     count = sum(len(numbers) for numbers in model.measured.values())
     if count < len(which) + (noise is None):
         raise InputError(
@@ -208,7 +210,7 @@ def fit(
         return stacked(model.slopes(size * x), False) * size
 
     found = least_squares(
-        misfit, first / size, jacobian, (low / size, high / size), "trf", 1e-12, 1e-12, 1e-12, max_nfev=evaluations
+        misfit, first / size, jacobian, (low / size, high / size), "trf", 1e-10, 1e-9, 1e-10, max_nfev=evaluations
     )
     values = size * found.x
     J = stacked(model.slopes(values), False)

@@ -182,7 +182,14 @@ class Sensitivity:
 
         by_parameter = self._by_parameter if np.any(self.problem.law.rough) else 0 * self._point
         return Onesided.of(
-            self.problem.law, self._point, contacts, self.tangent.D, by_parameter, self.distance * self.force, response
+            self.problem.law,
+            self._point,
+            contacts,
+            self.tangent.D,
+            by_parameter,
+            self.distance * self.force,
+            self.force,
+            response,
         )
 
     def adjoint(self, *, reactions: Any = None, multipliers: Any = None, displacements: Any = None) -> Dual:

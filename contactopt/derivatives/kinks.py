@@ -82,9 +82,10 @@ class Onesided:
         D: np.ndarray,
         P_mu: np.ndarray,
         distance: float,
+        force: float,
         response: Response,
     ) -> Onesided:
-        """From the map at all contacts, and the response (dr, dlambda, dy) of the linear system to an error (k, d)."""
+        """From the map at all contacts, a scale of the forces, and the response (dr, dlambda, dy) of the linear system to an error (k, d)."""
         d, own = y.shape[1], law.select(contacts)
         if len(contacts) * d > MOST:
             raise InputError(
@@ -102,8 +103,7 @@ class Onesided:
                 answers.append(response(unit))
         dr, dlam, dy = (np.array(part) for part in zip(*answers))
         S = dy[:, contacts].reshape(len(dy), -1).T
-        size = float(np.linalg.norm(y, axis=1).max(initial=0.0))
-        return cls(own, place, contacts, size, D[contacts], P_mu[contacts], dr, dlam, S)
+        return cls(own, place, contacts, force, D[contacts], P_mu[contacts], dr, dlam, S)
 
     def step(self, dy: np.ndarray, dmu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What to add to dr (k, d) and dlambda (p,) of the piece M, from its dy (k, d) and dmu (k,)."""

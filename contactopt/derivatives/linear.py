@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -25,6 +26,8 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.coupled import CoupledForm
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.problem.stacked import Stacked, Vector, norm
+from contactopt.solving.constants import LOOSE
+from contactopt.solving.kernels.bonded import Bonded
 from contactopt.solving.kernels.coupled import fitted
 from contactopt.solving.kernels.flexible import flexible_gmres
 from contactopt.solving.kernels.krylov import model_of
@@ -114,7 +117,52 @@ class Tangent:
         Q = self.problem.Q
         if isinstance(Q, InterfaceOperator):
             return Krylov(self) if Q.coupled is None else Coupled(self, Q.coupled)
-        return Sparse(self) if sp.issparse(Q) else Dense(self)
+        if sp.issparse(Q):
+            return Sparse(self)
+        loose = np.any(np.eye(self.problem.dim) != self.D, axis=(1, 2))
+        if loose.sum() <= LOOSE * len(loose):
+            with suppress(la.LinAlgError):  # a Q that is not symmetric or not definite
+                return Stuck(self, loose)
+        return Dense(self)
+
+
+class Stuck:
+    """K through the bonded system [[Q, V], [V', 0]] of a symmetric Q, one Cholesky factorisation, where most contacts stick.
+
+    M = L B + R with B the bonded matrix, L = D rho (rho where a contact sticks) and R = I - D. Hence w = L' a of the
+    transposed system M' a = g solves B w + R' a = g, and only the contacts N that do not stick are left as unknowns,
+
+        (rho D' + (B^-1)_NN (I - D)') a_N = (B^-1 g)_N.
+    """
+
+    def __init__(self, tangent: Tangent, loose: np.ndarray):
+        self.tangent, self.loose = tangent, np.flatnonzero(loose)
+        self.bonded = Bonded(tangent.problem.Q, tangent.problem.V)
+
+    def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
+        tangent, (k, d) = self.tangent, self.tangent.problem.q.shape
+        full, n = np.zeros(k * d), len(tangent.closed)
+        full[tangent.closed] = right[:n]
+        if not transposed:
+            dr, multipliers = self.bonded.step(tangent.rho, full.reshape(k, d), -right[n:], tangent.D)
+            return np.concatenate([dr.ravel()[tangent.closed], multipliers])
+        w, multipliers = self.bonded.solve(full, -right[n:])
+        a = w / np.repeat(tangent.rho, d)
+        if len(self.loose):
+            N = (self.loose[:, None] * d + np.arange(d)).ravel()
+            kept = np.eye(d) - tangent.D[self.loose]
+            scaled = tangent.rho[self.loose, None, None] * tangent.D[self.loose]
+            G = self.bonded.inverse(N)[N].reshape(len(N), len(self.loose), d)
+            matrix = np.einsum("nib,iab->nia", G, kept).reshape(len(N), len(N))
+            i = np.arange(len(self.loose))
+            matrix.reshape(len(i), d, len(i), d)[i, :, i, :] += scaled.transpose(0, 2, 1)
+            own = la.solve(matrix, w[N], check_finite=False)
+            added = np.zeros(k * d)
+            added[N] = np.einsum("iab,ia->ib", kept, own.reshape(-1, d)).ravel()
+            moved, more = self.bonded.solve(added, 0 * multipliers)
+            a, multipliers = a - moved / np.repeat(tangent.rho, d), multipliers - more
+            a[N] = own
+        return np.concatenate([a[tangent.closed], multipliers])
 
 
 class Dense:
@@ -132,15 +180,16 @@ class Dense:
         K[n:, :n] = problem.V[closed].T
         i = np.arange(n // d)
         K[:n, :n].reshape(len(i), d, len(i), d)[i, :, i, :] += np.eye(d) - D
-        size = np.linalg.norm(K, 1) if n + p else 0.0
+        size = np.linalg.norm(K, np.inf) if n + p else 0.0
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", la.LinAlgWarning)
-            self.factors = la.lu_factor(K, overwrite_a=True, check_finite=False)
+            # The transpose of a C array is what LAPACK factorises in place.
+            self.factors = la.lu_factor(K.T, overwrite_a=True, check_finite=False)
         if n + p and not la.lapack.dgecon(self.factors[0], size)[0] > SINGULAR:
             raise InputError(UNIQUE)
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
-        return np.asarray(la.lu_solve(self.factors, right, trans=int(transposed), check_finite=False))
+        return np.asarray(la.lu_solve(self.factors, right, trans=int(not transposed), check_finite=False))
 
 
 class Sparse:

@@ -90,7 +90,7 @@ class Step:
     @cached_property
     def displaced(self) -> tuple[np.ndarray, ...]:
         """U (n,) of every body."""
-        return self.reduction.displaced(self.solution.reactions, self.solution.multipliers)
+        return self.reduction.displaced(self.solution)
 
     @cached_property
     def forces(self) -> tuple[np.ndarray, ...]:
@@ -295,7 +295,11 @@ def _one_per_contact(which: Parameter, amount: Any, contacts: int) -> np.ndarray
 
 
 def solved_chain(
-    scenes: Sequence[Scene], tol: float, base: Reduction | None = None, starts: Sequence[Solution] | None = None
+    scenes: Sequence[Scene],
+    tol: float,
+    base: Reduction | None = None,
+    starts: Sequence[Solution] | None = None,
+    Q: str = "auto",
 ) -> Chain:
     """The certified states of a load path, without their energies; a path of one scene is one state.
 
@@ -305,13 +309,14 @@ def solved_chain(
     tol : bound on the certificate of every state
     base : a reduction of the same bodies, which is then only loaded anew
     starts : a solution for every state, to start from
+    Q : form of Q, as for contactopt.reduce
 
     Raises InputError where a state has no solution or is not solved.
     """
     steps: list[Step] = []
     before = None
     for number, scene in enumerate(scenes):
-        base = reduce_bodies(scene) if base is None else base.loaded(scene)
+        base = reduce_bodies(scene, Q=Q) if base is None else base.loaded(scene)
         q = base.problem.q.copy()
         if before is not None:
             q[:, 1:] -= before[:, 1:]

@@ -6,18 +6,20 @@ its centre where its nodes lie in rows, and as a coloured map where they do not.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contactopt.analysis.edges import contact_area, contact_edge
 from contactopt.analysis.status import contact_status
-from contactopt.derivatives.design import Design
-from contactopt.derivatives.fit import Fit
 from contactopt.figures.bodies import deformed, magnification, mirror_plane
 from contactopt.figures.style import ARROWS, BLUE, GREEN, GREY, ORANGE, make_axes, singular
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from contactopt.derivatives.design import Design
+    from contactopt.derivatives.fit import Fit
 
 __all__ = [
     "BLUE", "GREEN", "GREY", "ORANGE", "contact_figure", "contact_line", "contact_place", "convergence", "deformed", "magnification",

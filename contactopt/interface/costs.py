@@ -1,27 +1,48 @@
-"""The choice between the forms of Q by their cost, with every number that it rests on.
+"""The choice between the ways to a solution by their cost, with every number that it rests on.
 
-`python -m experiments.questions.form_of_q` measures PRODUCTS, SOLVE, DENSE and the entries of the factors on punches of growing size,
-and the table of costs of `python -m experiments.questions.preconditioners` shows where the two forms cost the same. MOST_EXPLICIT is not
-fitted but chosen: an array of half a gigabyte.
+`python -m experiments.questions.ways` measures the ways on punches of growing size, in the plane and in space, fits COSTS to the
+measured times and draws both as maps (reports/ways/report.md). MOST_EXPLICIT is not fitted but chosen: an array of half a gigabyte.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-PRODUCTS = 60  # with Q, of a solve from cold
-SOLVE = {2: 1.2, 3: 0.4}  # time of an operation of a product over one of the elimination, by dimension
-DENSE = 10  # speed of dense linear algebra over that of a sparse factorisation
+WAYS = ("dense", "products", "coupled")
 MOST_EXPLICIT = 8000  # interface unknowns of an explicit Q that is chosen without being asked for
 
+# (dimension, body solver) -> seconds per unit of each of `terms`, on one core
+COSTS: dict[tuple[int, str], tuple[float, ...]] = {
+    (2, "superlu"): (3.35e-05, 0.0, 4.8e-10, 1.21e-06),
+    (2, "pardiso"): (2.87e-05, 0.0, 2.47e-10, 3.43e-06),
+    (2, "multigrid"): (8.1e-05, 0.0, 0.0, 0.0),
+    (3, "superlu"): (6.77e-05, 5.44e-09, 1.34e-09, 2.38e-06),
+    (3, "pardiso"): (6.26e-05, 1.12e-09, 4.86e-10, 5.08e-06),
+    (3, "multigrid"): (0.00012, 0.0, 0.0, 0.0),
+}
 
-def form_of(m: int, n: int, dim: int, iterative: bool) -> str:
-    """The cheaper form of Q, 'explicit' or 'implicit', from counts of operations.
 
-    An explicit Q takes m^3 / 3 operations to eliminate the contact unknowns last, at the speed of a sparse factorisation,
-    and about 3 m^3 for the inverse and the steps of Newton's method at DENSE times that speed. An implicit Q takes PRODUCTS
-    products of 4 operations, at the price SOLVE, for each entry of the factors. Nested dissection leaves 4 n log2 n entries
-    in 2D and 17 n^(4/3) in 3D. Bodies without factors would need m solves for an explicit Q, which never pays.
+def terms(way: str, m: int, n: int, dim: int) -> np.ndarray:
+    """What the cost of a way grows with (4,), for n unknowns of the largest body, m of them on its contact surface.
+
+    Assembly grows with n, and so does the coupled way with its V-cycles. Factors take n^1.5 operations in the plane and n^2 in
+    space, a dense Q m^3, and products with Q n log2 n or n^(4/3) (nested dissection).
+    """
+    factors = n ** (1.5 if dim == 2 else 2.0)
+    substitution = n * np.log2(max(n, 2)) if dim == 2 else n ** (4 / 3)
+    of_way = {"dense": (n, factors, m**3, 0), "products": (n, factors, 0, substitution), "coupled": (n, 0, 0, 0)}
+    return np.array(of_way[way], dtype=float)
+
+
+def seconds(way: str, m: int, n: int, dim: int, solver: str) -> float:
+    """The estimated time of set-up and solution on one core."""
+    return float(np.dot(COSTS[dim, solver], terms(way, m, n, dim)))
+
+
+def form_of(m: int, n: int, dim: int, iterative: bool, solver: str = "superlu") -> str:
+    """The cheaper form of Q, 'explicit' or 'implicit'.
+
+    Bodies without factors would need m solves for an explicit Q, which never pays.
 
     Parameters
     ----------
@@ -33,9 +54,10 @@ def form_of(m: int, n: int, dim: int, iterative: bool) -> str:
         Dimension of space, 2 or 3.
     iterative
         Whether a body has no factors.
+    solver
+        Of the bodies with factors.
     """
-    explicit = m**3 / 3 + 3 * m**3 / DENSE
-    entries = 4 * n * np.log2(max(n, 2)) if dim == 2 else 17 * n ** (4 / 3)
-    return (
-        "implicit" if iterative or m > MOST_EXPLICIT or explicit > 4 * PRODUCTS * SOLVE[dim] * entries else "explicit"
-    )
+    if iterative or m > MOST_EXPLICIT:
+        return "implicit"
+    dense, products = (seconds(way, m, n, dim, solver) for way in WAYS[:2])
+    return "explicit" if dense <= products else "implicit"

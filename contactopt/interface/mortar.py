@@ -163,7 +163,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
         _log.warning(
             "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)", upper.name, lower.name, -sums.least, where
         )
-    weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, sums.nodes)
+    weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, sums.nodes, normals)
     if first == 1:
         weights, alone = weights[::-1], alone[::-1]
     return Mortar(first, sums.nodes, sums.areas, n, gap, x, weights, alone, lever, carried)
@@ -209,13 +209,17 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
     return normals, area ** (1 / (surface.dim - 1))
 
 
-def _alone(own: Faces, other: Faces, points: Overlap, nodes: np.ndarray) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """The own node of every contact, and the shape functions of the other side at the place that faces it."""
+def _alone(
+    own: Faces, other: Faces, points: Overlap, nodes: np.ndarray, normals: np.ndarray
+) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """The own node of every contact, and the shape functions of the other side at the place on its normal."""
     k = len(nodes)
     mine = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), (k, own.points.shape[1]))
     x = own.points[:, nodes]
     near = KDTree(own.locations(points.cell // len(own.cells), points.at)[0].T).query(x.T)[1]
-    there = other.locate(points.face[near], x, points.axes[near], points.there[:, near])
+    n, axes = normals[:, nodes].T[:, None], points.axes[near]
+    axes = axes - np.sum(axes * n, axis=2, keepdims=True) * n
+    there = other.locate(points.face[near], x, axes, points.there[:, near])
     there = np.clip(there, 0.0, 1.0)
     if other.corners == 3:
         there /= np.maximum(there.sum(axis=0), 1.0)

@@ -12,7 +12,6 @@ __all__ = ["Fields", "recover"]
 
 def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:
     """Displacement and stress of the elastic bodies of a solved scene, upper body first."""
-    displaced = zip(reduction.bodies, reduction.displaced(solution.reactions, solution.multipliers))
-    parallel = [body.parallel for body in reduction.bodies]
-    fields = each(lambda pair: pair[0].fields(pair[1]), displaced, parallel)
+    displaced = zip(reduction.bodies, reduction.displaced(solution))
+    fields = each(lambda pair: pair[0].fields(pair[1]), displaced)
     return tuple(found for found in fields if found is not None)

@@ -17,6 +17,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,14 +27,14 @@ import scipy.sparse as sp
 from contactopt.bodies import assemble
 from contactopt.bodies.concurrency import each
 from contactopt.bodies.protocol import AssembledBody, Body
-from contactopt.bodies.ranks import RemotePart
+from contactopt.bodies.solvers import factors_of
 from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
 from contactopt.interface.coupling import Coupling, couple
 from contactopt.interface.equilibrium import coupled_form
-from contactopt.problem import InterfaceProblem, Law, Pair
+from contactopt.problem import InterfaceProblem, Law, Pair, Solution
 from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
@@ -47,6 +48,7 @@ from contactopt.problem.operators import (
     estimate_diagonal,
     nodal_weights,
 )
+from contactopt.problem.threads import one_blas_thread
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import MOST_ACROSS, Part, Scene
 
@@ -125,13 +127,18 @@ class Reduction:
         ends = np.cumsum([len(body.resultants) for body in self.bodies])
         return tuple(np.split(multipliers, ends[:-1]))
 
-    def displaced(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, ...]:
-        """The displacements U (n,) of every body under reactions (k, dim) and multipliers (p,)."""
-        parts = zip(self.bodies, self.maps, self.own_multipliers(multipliers))
+    def displaced(self, solution: Solution) -> tuple[np.ndarray, ...]:
+        """The displacements U (n,) of every body of a solution.
 
-        def displaced(part: tuple[Body, sp.csr_matrix, np.ndarray]) -> np.ndarray:
-            body, B, own = part
-            return body.displacement(B.T @ reactions.ravel(), own)
+        Bodies whose displacements came with the contact forces are not solved again.
+        """
+        known = [] if solution.displacements is None else list(solution.displacements.parts)
+        free = [known.pop(0) if known and body.equilibrium is not None else None for body in self.bodies]
+        parts = zip(self.bodies, self.maps, self.own_multipliers(solution.multipliers), free)
+
+        def displaced(part: tuple[Body, sp.csr_matrix, np.ndarray, Any]) -> np.ndarray:
+            body, B, own, X = part
+            return body.displacement(B.T @ solution.reactions.ravel(), own, X)
 
         return each(displaced, parts, [body.parallel for body in self.bodies])
 
@@ -252,8 +259,7 @@ def reduce_bodies(
         check_number("the contact zone's half-width", zone, low=0.0)
     seconds: dict[str, float] = {}
     start = time.perf_counter()
-    elsewhere = [isinstance(part, RemotePart) for part in scene.parts]
-    assembled = each(lambda part: assemble(scene, part, elements, zone), scene.parts, elsewhere)
+    assembled = each(lambda part: assemble(scene, part, elements, zone), scene.parts)
     named = {body.name: body for body in assembled}
     sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
     coupled = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in zip(scene.pairs, sides))
@@ -266,11 +272,15 @@ def reduce_bodies(
         contact, largest = (max(getattr(b, size) for b in assembled) for size in ("interface_unknowns", "unknowns"))
         if _filling(maps) ** 0.5 > MOST_EXPLICIT:
             contact = MOST_EXPLICIT + 1
-        Q = form_of(contact, largest, scene.dim, any(b.iterates(solver) for b in assembled))
+        Q = form_of(
+            contact, largest, scene.dim, any(b.iterates(solver) for b in assembled), factors_of(solver, scene.dim)
+        )
     log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, n)
     if Q == "explicit":
         check_dense(round(_filling(maps) ** 0.5))
-    bodies = each(lambda body: body.prepare(solver, Q == "explicit"), assembled)
+    iterate = any(body.iterates(solver) for body in assembled)
+    with one_blas_thread() if iterate else nullcontext():
+        bodies = each(lambda body: body.prepare(solver, Q == "explicit"), assembled)
     seconds["factorise"] = time.perf_counter() - start
 
     start = time.perf_counter()

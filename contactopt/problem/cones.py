@@ -20,14 +20,40 @@ def unit(t: np.ndarray) -> np.ndarray:
 
 
 def disc(t: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Nearest points of discs |t| <= radius: t (k, d), radius (k,) >= 0; an interval for d = 1."""
+    """Nearest points of discs |t| <= radius; of intervals for d = 1.
+
+    Parameters
+    ----------
+    t
+        (k, d) points.
+    radius
+        (k,) radii, at least 0.
+
+    Returns
+    -------
+    array (k, d)
+        The nearest points.
+    """
     length = np.linalg.norm(t, axis=1)
     shrink = np.divide(radius, length, out=np.ones_like(length), where=length > radius)
     return np.asarray(t * shrink[:, None])
 
 
 def coulomb_cone(r: np.ndarray, mu: np.ndarray) -> np.ndarray:
-    """Nearest points of the cones |r_t| <= mu r_n: r (k, dim), mu (k,) >= 0."""
+    """Nearest points of Coulomb's cones |r_t| <= mu r_n.
+
+    Parameters
+    ----------
+    r
+        (k, dim) points, normal component first.
+    mu
+        (k,) friction coefficients, at least 0.
+
+    Returns
+    -------
+    array (k, dim)
+        The nearest points.
+    """
     n, t = split(r)
     length = np.linalg.norm(t, axis=1)
     inside = (length <= mu * n) & (n >= 0)  # without friction a tension is outside, too
@@ -40,15 +66,40 @@ def coulomb_cone(r: np.ndarray, mu: np.ndarray) -> np.ndarray:
 
 
 def half_line_derivative(y: np.ndarray, low: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of y (k, 1) on [low, inf) and its generalised derivative (k, 1, 1); low may be -inf, one or (k,)."""
+    """Projection on the half-line [low, inf), and its generalised derivative.
+
+    Parameters
+    ----------
+    y
+        (k, 1) points.
+    low
+        One number or (k,); it may be -inf.
+
+    Returns
+    -------
+    arrays (k, 1) and (k, 1, 1)
+        The nearest points and the derivative, 0 or 1.
+    """
     bound = np.broadcast_to(low, len(y))[:, None]
     return np.maximum(y, bound), (y > bound).astype(float)[:, :, None]
 
 
 def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of y (k, d) on discs |y| <= radius and its generalised derivative (k, d, d).
+    """Projection on discs |y| <= radius, and its generalised derivative.
 
-    Outside the disc the derivative is (radius / |y|) (I - y y' / |y|^2), zero for d = 1.
+    Outside the disc the derivative is (radius / |y|) (I - y y' / |y|^2), which is zero for d = 1.
+
+    Parameters
+    ----------
+    y
+        (k, d) points.
+    radius
+        (k,) radii, at least 0.
+
+    Returns
+    -------
+    arrays (k, d) and (k, d, d)
+        The nearest points and the derivative.
     """
     k, d = y.shape
     length = np.linalg.norm(y, axis=1)
@@ -66,7 +117,22 @@ def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.n
 def cylinder_derivative(
     y: np.ndarray, radius: np.ndarray, low: np.ndarray | float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of y (k, dim) on r_n >= low, |r_t| <= radius (k,), and its generalised derivative (k, dim, dim)."""
+    """Projection on the cylinders r_n >= low, |r_t| <= radius, and its generalised derivative.
+
+    Parameters
+    ----------
+    y
+        (k, dim) points, normal component first.
+    radius
+        (k,) radii, at least 0.
+    low
+        One number or (k,); it may be -inf.
+
+    Returns
+    -------
+    arrays (k, dim) and (k, dim, dim)
+        The nearest points and the derivative.
+    """
     P, D = np.empty_like(y), np.zeros((*y.shape, y.shape[1]))
     P[:, :1], D[:, :1, :1] = half_line_derivative(y[:, :1], low)
     P[:, 1:], D[:, 1:, 1:] = disc_derivative(y[:, 1:], radius)
@@ -76,9 +142,23 @@ def cylinder_derivative(
 def disc_of_height(
     height: np.ndarray, t: np.ndarray, mu: np.ndarray, slope: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The heights beside t (k, dim - 1) projected on discs of radius mu |height|, and the derivative (k, dim, dim).
+    """Projection of the tangential part alone, on discs whose radius is mu |height|, and its derivative.
 
-    slope  (k,) derivative of |height| by the height, so that the radii grow by mu slope
+    Parameters
+    ----------
+    height
+        (k,) normal components, which stay as they are.
+    t
+        (k, dim - 1) tangential components.
+    mu
+        (k,) friction coefficients.
+    slope
+        (k,) derivative of |height| by the height, so that the radii grow by mu slope.
+
+    Returns
+    -------
+    arrays (k, dim) and (k, dim, dim)
+        The heights beside the projected tangential components, and the derivative.
     """
     k, dim = len(t), t.shape[1] + 1
     bound, grow = mu * np.abs(height), mu * slope
@@ -96,10 +176,23 @@ def disc_of_height(
 
 
 def coulomb_cone_derivative(y: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of y (k, dim) on Coulomb's cones, as coulomb_cone, and its generalised derivative (k, dim, dim).
+    """Projection on Coulomb's cones as in coulomb_cone(), and its generalised derivative.
 
-    Identity inside the cone and zero in its polar. Between them the nearest point is h (1, mu unit) with
-    h = (y_n + mu |y_t|) / (1 + mu^2): the derivative projects on that ray and shrinks what is tangent to the disc.
+    The derivative is the identity inside the cone and zero in its polar. Between them the nearest point is h (1, mu
+    unit) with h = (y_n + mu |y_t|) / (1 + mu^2). The derivative projects on that ray and shrinks what is tangent to
+    the disc.
+
+    Parameters
+    ----------
+    y
+        (k, dim) points, normal component first.
+    mu
+        (k,) friction coefficients, at least 0.
+
+    Returns
+    -------
+    arrays (k, dim) and (k, dim, dim)
+        The nearest points and the derivative.
     """
     k, dim = y.shape
     n, t = split(y)

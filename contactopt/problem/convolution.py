@@ -20,6 +20,7 @@ import numpy as np
 
 from contactopt.problem.counter import Counter
 from contactopt.problem.operators import InterfaceOperator, check_dense
+from contactopt.problem.threads import cores
 
 SINGLE = 2e-6  # accuracy of products from which on single precision serves
 LEVELS = 4  # halvings of the grid that its padding allows for
@@ -203,7 +204,7 @@ def workers_for(padded: tuple[int, ...]) -> int:
     """Number of processors for transforms of that size; OMP_NUM_THREADS bounds it."""
     if np.prod(padded) < LARGE:
         return 1
-    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    available = cores()
     asked = os.environ.get("OMP_NUM_THREADS", "")
     return min(available, int(asked)) if asked.isdigit() and int(asked) > 0 else available
 

@@ -131,7 +131,18 @@ Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or I
 
 
 def sparse(Q: object) -> sp.csr_array:
-    """Any scipy sparse matrix as compressed rows of floats with sorted columns, duplicates summed, in memory of its own."""
+    """Any scipy sparse matrix as compressed rows of floats, in memory of its own.
+
+    Parameters
+    ----------
+    Q
+        A scipy sparse matrix in any format.
+
+    Returns
+    -------
+    csr_array
+        With sorted columns, duplicates summed and zeros left out.
+    """
     rows = sp.csr_array(Q, dtype=float, copy=True)
     rows.sum_duplicates()
     rows.eliminate_zeros()
@@ -139,7 +150,13 @@ def sparse(Q: object) -> sp.csr_array:
 
 
 def check_dense(n: int) -> None:
-    """Before Q (n, n) is formed as an array: log its size, as a warning from NOTABLE_BYTES on, and refuse it beyond MOST_BYTES.
+    """Before Q is formed as an array: log its size, as a warning from NOTABLE_BYTES on, and refuse it beyond
+    MOST_BYTES.
+
+    Parameters
+    ----------
+    n
+        Number of rows of Q.
 
     Raises
     ------
@@ -157,7 +174,23 @@ def check_dense(n: int) -> None:
 
 
 def dense(Q: Interface) -> np.ndarray:
-    """Q as an array (n, n); InputError if it would be larger than MOST_BYTES."""
+    """Q as an array.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+
+    Returns
+    -------
+    array (n, n)
+        Q itself if it is an array.
+
+    Raises
+    ------
+    InputError
+        If it would be larger than MOST_BYTES.
+    """
     if isinstance(Q, InterfaceOperator):
         return Q.to_dense()
     if not sp.issparse(Q):
@@ -167,21 +200,54 @@ def dense(Q: Interface) -> np.ndarray:
 
 
 def diagonal(Q: Interface) -> np.ndarray:
-    """The diagonal of Q (n,), or the operator's estimate of it."""
+    """The diagonal of Q, or the estimate of it that an operator has.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+
+    Returns
+    -------
+    array (n,)
+        [length / force].
+    """
     if isinstance(Q, InterfaceOperator):
         return Q.diagonal
     return np.asarray(Q.diagonal())
 
 
 def row_sizes(Q: np.ndarray | sp.csr_array) -> np.ndarray:
-    """(n,) largest |Q_ij| of each row."""
+    """The largest |Q_ij| of each row.
+
+    Parameters
+    ----------
+    Q
+        An array or sparse rows.
+
+    Returns
+    -------
+    array (n,)
+        [length / force].
+    """
     if sp.issparse(Q):
         return np.asarray(abs(Q).max(axis=1).toarray()).ravel() if Q.shape[0] else np.zeros(0)
     return np.asarray(np.abs(Q).max(axis=1, initial=0.0))
 
 
 def asymmetry(Q: Interface) -> float:
-    """max |Q - Q'| / max |Q| [-]; an operator is symmetric."""
+    """By how much Q misses to be symmetric:  max |Q - Q'| / max |Q|.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+
+    Returns
+    -------
+    float
+        0 for an operator, which is symmetric by definition.
+    """
     if isinstance(Q, InterfaceOperator):
         return 0.0
     if sp.issparse(Q):
@@ -192,7 +258,18 @@ def asymmetry(Q: Interface) -> float:
 
 
 def held(Q: Interface) -> np.ndarray:
-    """(n,) mask of the components that cannot move: coupled to no other component."""
+    """The components that cannot move, because they are coupled to no other component.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+
+    Returns
+    -------
+    array (n,) of bool
+        A mask.
+    """
     if isinstance(Q, InterfaceOperator):
         return Q.held
     size = abs(Q)
@@ -201,7 +278,20 @@ def held(Q: Interface) -> np.ndarray:
 
 
 def shifted(Q: Interface, added: np.ndarray) -> Interface:
-    """Q + diag(added), added (n,); products count with those of Q."""
+    """Q + diag(added), of the same form as Q.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    added
+        (n,) what is added to the diagonal [length / force].
+
+    Returns
+    -------
+    array, sparse rows or InterfaceOperator
+        Products with it count with those of Q.
+    """
     if sp.issparse(Q):
         return sp.csr_array(Q + sp.diags_array(added))
     if not isinstance(Q, InterfaceOperator):
@@ -210,14 +300,40 @@ def shifted(Q: Interface, added: np.ndarray) -> Interface:
 
 
 def block(Q: Interface, unknowns: np.ndarray) -> Interface:
-    """Q on some unknowns alone."""
+    """Q on some unknowns alone, of the same form as Q.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    unknowns
+        (m,) their numbers.
+
+    Returns
+    -------
+    array, sparse rows or InterfaceOperator
+        (m, m); products with it count with those of Q.
+    """
     if sp.issparse(Q):
         return sp.csr_array(Q[unknowns][:, unknowns])
     return Q.block(unknowns) if isinstance(Q, InterfaceOperator) else Q[np.ix_(unknowns, unknowns)]
 
 
 def loosened(Q: Interface, accuracy: float) -> Interface:
-    """Q with products no more accurate than that where it saves work."""
+    """Q with products that are no more accurate than asked, where this saves work.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    accuracy
+        Relative error of a product that is good enough.
+
+    Returns
+    -------
+    array, sparse rows or InterfaceOperator
+        Q itself where a lower accuracy makes nothing cheaper.
+    """
     accuracy = max(accuracy, FINEST)
     return Q.loosened(accuracy) if isinstance(Q, InterfaceOperator) and Q.inexact else Q
 
@@ -245,10 +361,23 @@ def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
 
 
 def estimate_diagonal(product: Product, weights: Sequence[np.ndarray], moves: np.ndarray) -> np.ndarray:
-    """diag(Q) (k dim,) from one product: its trace (Hutchinson 1989) on each pair of surfaces, shared out by weights.
+    """The diagonal of Q from one product.
 
-    weights  (k_i,) nodal_weights of each pair, one pair after the other
-    moves    (k dim,) mask of the components that can move; the diagonal is 0 elsewhere
+    The trace on each pair of surfaces is estimated with random signs (Hutchinson 1989) and shared out by the weights.
+
+    Parameters
+    ----------
+    product
+        The product with Q.
+    weights
+        (k_i,) nodal_weights() of each pair of surfaces, one pair after the other.
+    moves
+        (k dim,) mask of the components that can move.
+
+    Returns
+    -------
+    array (k dim,)
+        The estimate [length / force], 0 where a component cannot move.
     """
     signs = np.where(np.random.default_rng(0).random(len(moves)) < 0.5, -1.0, 1.0) * moves
     moved = product(signs[:, None], 1e-2)[:, 0]

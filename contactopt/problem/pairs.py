@@ -73,4 +73,4 @@ def alone(problem: InterfaceProblem, solution: Solution, pair: Pair) -> tuple[In
     part, r, lam = part_of(problem, pair), solution.reactions[pair.contacts], solution.multipliers
     apart = problem.displacements(solution.reactions, lam)[pair.contacts] - part.displacements(r, lam)
     held = replace(part, q=part.q + apart, s=-(part.V.T @ r.ravel()))
-    return held, replace(solution, reactions=r)
+    return held, replace(solution, reactions=r, displacements=None)

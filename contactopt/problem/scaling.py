@@ -69,9 +69,13 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
 
 def immovable(problem: InterfaceProblem) -> np.ndarray:
     """Mask (k dim,) of the components that neither forces nor multipliers nor q move."""
-    sizes = problem.Q.diagonal if isinstance(problem.Q, InterfaceOperator) else row_sizes(problem.Q)
-    moves = [sizes, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
-    return np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
+    d = np.abs(diagonal(problem.Q))
+    moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
+    still = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
+    if still.any() and not isinstance(problem.Q, InterfaceOperator):
+        rows = np.flatnonzero(still)
+        still[rows] = row_sizes(problem.Q[rows]) <= NOISE * d.max(initial=0.0)
+    return still
 
 
 def _closing(problem: InterfaceProblem) -> float:

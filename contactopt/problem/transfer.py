@@ -53,7 +53,7 @@ def transfer(source: InterfaceProblem, solution: Solution, target: InterfaceProb
     else:
         chart = Chart(old[:1], (False,)) if thin else source.chart
         values = _along_a_line(chart, old, new, traction)
-    return replace(solution, reactions=values * target.areas[:, None])
+    return replace(solution, reactions=values * target.areas[:, None], displacements=None)
 
 
 def _by_pair(source: InterfaceProblem, solution: Solution, target: InterfaceProblem) -> Solution:
@@ -65,7 +65,7 @@ def _by_pair(source: InterfaceProblem, solution: Solution, target: InterfaceProb
     for old, new in zip(source.pairs, target.pairs):
         own = replace(solution, reactions=solution.reactions[old.contacts])
         reactions.append(transfer(part_of(source, old), own, part_of(target, new)).reactions)
-    return replace(solution, reactions=np.concatenate(reactions))
+    return replace(solution, reactions=np.concatenate(reactions), displacements=None)
 
 
 def _plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,10 +11,24 @@ MOST_CELLS = 2e7  # of one mesh
 
 
 def graded(length: float, first: float, growth: float) -> np.ndarray:
-    """Grid from 0 to `length` whose spacing starts at about `first` and grows by a ratio of at most `growth`.
+    """A grid whose spacing grows from one end to the other.
 
-    The number of cells is the smallest that keeps the ratio; the ratio is then lowered so that the first cell is
-    exactly `first`. A grid that would need one cell or less is a single cell.
+    The number of cells is the smallest that keeps the ratio of neighbours below its bound. The ratio is then lowered
+    so that the first cell is exactly as long as asked. A grid that would need one cell or less is a single cell.
+
+    Parameters
+    ----------
+    length
+        Of the whole grid [length].
+    first
+        Length of the first cell [length].
+    growth
+        Largest ratio of neighbouring cells.
+
+    Returns
+    -------
+    array (n,)
+        Ascending from 0 to `length`.
     """
     from scipy.optimize import brentq
 
@@ -33,7 +47,24 @@ def graded(length: float, first: float, growth: float) -> np.ndarray:
 
 
 def contact_grid(half_width: float, elements: int, length: float, growth: float) -> np.ndarray:
-    """Uniform grid of `elements` cells on [0, half_width], then graded out to `length`."""
+    """A grid that is uniform in the contact zone and graded away from it.
+
+    Parameters
+    ----------
+    half_width
+        Of the zone [length].
+    elements
+        Number of cells in the zone.
+    length
+        Of the whole grid [length].
+    growth
+        Largest ratio of neighbouring cells beyond the zone.
+
+    Returns
+    -------
+    array (n,)
+        Ascending from 0 to `length`.
+    """
     zone = np.linspace(0.0, half_width, elements + 1)
     if length <= half_width * (1 + 1e-12):
         return zone
@@ -42,7 +73,23 @@ def contact_grid(half_width: float, elements: int, length: float, growth: float)
 
 
 def tensor_mesh(*grids: np.ndarray) -> MeshQuad | MeshHex:
-    """Bricks on a tensor grid. Boundaries 'x-', 'x+', 'y-', 'y+' (, 'z-', 'z+'): the faces of the box."""
+    """Quadrilaterals or hexahedra on a tensor grid.
+
+    Parameters
+    ----------
+    grids
+        Two or three ascending arrays, the places of the nodes along x, y and z [length].
+
+    Returns
+    -------
+    MeshQuad or MeshHex
+        Its boundaries 'x-', 'x+', 'y-', 'y+' and in space 'z-', 'z+' are the sides of the box.
+
+    Raises
+    ------
+    InputError
+        If the mesh would have more than MOST_CELLS cells.
+    """
     cells = np.prod([float(len(grid) - 1) for grid in grids])
     if cells > MOST_CELLS:
         raise InputError(f"a mesh of {cells:.0e} elements is more than {MOST_CELLS:.0e}; take fewer elements.")
@@ -56,16 +103,42 @@ def tensor_mesh(*grids: np.ndarray) -> MeshQuad | MeshHex:
 
 
 def rename(mesh: MeshQuad | MeshHex, **names: str) -> MeshQuad | MeshHex:
-    """The mesh with boundaries of tensor_mesh under further names, e.g. rename(mesh, contact="y-")."""
+    """The mesh with further names for some of its boundaries.
+
+    Parameters
+    ----------
+    mesh
+        As tensor_mesh() makes it.
+    names
+        New name = old name, as in rename(mesh, contact="y-").
+
+    Returns
+    -------
+    MeshQuad or MeshHex
+        With both names.
+    """
     return mesh.with_boundaries({new: mesh.boundaries[old] for new, old in names.items()})
 
 
 def half_sphere_section(radius: float, x: np.ndarray, y: np.ndarray) -> MeshQuad:
-    """Meridian section of a half sphere that touches z = 0 at the origin; its flat face is at z = radius.
+    """Meridian section of a half sphere that touches z = 0 at the origin.
 
-    x  radii of the nodes on the lower part of the arc, from 0 to radius / sqrt(2) (the arc's middle);
-    y  fractions from 0 to 1 of the way from the arc up, graded from the contact.
-    The quarter disc has three corners; the arc's middle serves as the fourth. Boundaries: 'axis', 'arc', 'top'.
+    The quarter disc has three corners; the middle of the arc serves as the fourth.
+
+    Parameters
+    ----------
+    radius
+        Of the sphere [length].
+    x
+        (n,) distances from the axis of the nodes on the lower part of the arc, from 0 to radius / sqrt(2), its middle
+        [length].
+    y
+        (m,) fractions from 0 to 1 of the way from the arc up, graded from the contact.
+
+    Returns
+    -------
+    MeshQuad
+        With the boundaries 'axis', 'arc' and 'top', the flat face at z = radius.
     """
     mesh = tensor_mesh(x / x[-1], y)
     s, t = mesh.p
@@ -90,7 +163,24 @@ def _arc(radius: float, angle: np.ndarray) -> np.ndarray:
 
 
 def patch(mesh: MeshQuad | MeshHex, boundary: str, name: str, limits: list[float]) -> MeshQuad | MeshHex:
-    """Add boundary `name`: the facets of `boundary` whose midpoints lie within [0, limits[i]] along axis i."""
+    """The mesh with a part of one of its boundaries as a boundary of its own.
+
+    Parameters
+    ----------
+    mesh
+        Any mesh with named boundaries.
+    boundary
+        Name of the whole.
+    name
+        Name of the part.
+    limits
+        Facets whose midpoints are below limits[i] along each axis i belong to the part [length].
+
+    Returns
+    -------
+    MeshQuad or MeshHex
+        With the new boundary.
+    """
     facets = np.asarray(mesh.boundaries[boundary])
     middle = mesh.p[:, mesh.facets[:, facets]].mean(axis=1)
     inside = np.all([middle[i] < limit for i, limit in enumerate(limits)], axis=0)
@@ -98,10 +188,25 @@ def patch(mesh: MeshQuad | MeshHex, boundary: str, name: str, limits: list[float
 
 
 def simplices(mesh: MeshQuad | MeshHex) -> MeshTri | MeshTet:
-    """Every quadrilateral cut into two triangles, every hexahedron into six tetrahedra; boundaries keep their names.
+    """Every quadrilateral cut into two triangles, every hexahedron into six tetrahedra.
 
-    Edges become straight. Bodies cut from meshes with the same cells on their contact faces match there, since all
-    cells are cut the same way. Raises InputError if neighbours are not: number the vertices of all cells in one order.
+    Edges become straight. All cells are cut in the same way, so that bodies match whose meshes had the same cells on
+    their contact faces.
+
+    Parameters
+    ----------
+    mesh
+        Of quadrilaterals or hexahedra.
+
+    Returns
+    -------
+    MeshTri or MeshTet
+        Boundaries keep their names.
+
+    Raises
+    ------
+    InputError
+        If neighbours are not cut alike; number the vertices of all cells in one order then.
     """
     vertices = mesh.p[:, : mesh.nvertices]
     cut = MeshQuad(vertices, mesh.t).to_meshtri() if len(vertices) == 2 else MeshHex(vertices, mesh.t).to_meshtet()

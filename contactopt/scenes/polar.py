@@ -15,9 +15,20 @@ NEAR = 1e-9  # what counts as zero beside the size of the body
 
 
 def ring(radii: np.ndarray, angles: np.ndarray) -> MeshQuad2:
-    """Quadrilaterals between the radii (ascending) and the angles [rad], from the x axis towards y (ascending).
+    """Quadrilaterals between circles and rays; their edges along circles bend with them.
 
-    Boundaries: 'inner', 'outer', and unless the ring is closed 'start' and 'end', which lie at the first and the last angle.
+    Parameters
+    ----------
+    radii
+        (m,) ascending radii of the circles [length].
+    angles
+        (n,) ascending angles of the rays, from the x axis towards y [rad].
+
+    Returns
+    -------
+    MeshQuad2
+        With the boundaries 'inner' and 'outer', and 'start' and 'end' at the first and the last angle unless the ring
+        is closed.
     """
     flat = tensor_mesh(angles, radii)
     angle, radius = flat.p
@@ -36,9 +47,19 @@ def ring(radii: np.ndarray, angles: np.ndarray) -> MeshQuad2:
 
 
 def right_half_disc(radius: float, sectors: int) -> MeshQuad2:
-    """The half disc x >= 0: its nodes on the circle divide it evenly into 4 * sectors parts.
+    """The half disc x >= 0.
 
-    Boundaries: 'rim' and 'axis', the diameter x = 0.
+    Parameters
+    ----------
+    radius
+        Of the disc [length].
+    sectors
+        The nodes on the half circle divide it evenly into 4 * sectors parts.
+
+    Returns
+    -------
+    MeshQuad2
+        With the boundaries 'rim' and 'axis', the diameter x = 0.
     """
     (x, y), t = half_disc(np.linspace(0.0, radius, 2 * sectors + 1), sectors)
     made = _quads(np.stack([y, -x]), t)
@@ -48,7 +69,20 @@ def right_half_disc(radius: float, sectors: int) -> MeshQuad2:
 
 
 def disc(radius: float, sectors: int) -> MeshQuad2:
-    """The whole disc, its circle divided evenly into 8 * sectors parts. Boundary: 'rim'."""
+    """The whole disc.
+
+    Parameters
+    ----------
+    radius
+        Of the disc [length].
+    sectors
+        The nodes on the circle divide it evenly into 8 * sectors parts.
+
+    Returns
+    -------
+    MeshQuad2
+        With the boundary 'rim'.
+    """
     (x, y), t = half_disc(np.linspace(0.0, radius, 2 * sectors + 1), sectors)
     diameter = np.flatnonzero(np.abs(y) < NEAR * radius)
     along = diameter[np.argsort(x[diameter])]
@@ -82,6 +116,19 @@ def _on_circles(mesh: MeshQuad, only: float | None = None) -> MeshQuad2:
 
 
 def even(start: float, end: float, parts: int) -> np.ndarray:
-    """Radii of rings whose elements are about square if the half circle has that many parts: a geometric series."""
+    """Radii of rings whose elements are about square, a geometric series.
+
+    Parameters
+    ----------
+    start, end
+        The first and the last radius [length].
+    parts
+        Number of elements along half the circle.
+
+    Returns
+    -------
+    array (n,)
+        Ascending radii [length].
+    """
     count = max(1, round(np.log(end / start) * parts / np.pi))
     return np.asarray(np.geomspace(start, end, count + 1))

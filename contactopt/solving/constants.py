@@ -1,7 +1,7 @@
 """Numbers of the methods and their kernels that were chosen by trial, all of them, with the command that shows what each is worth.
 
 `python -m experiments.questions.solving_constants` halves and doubles each of them on problems of elastic bodies, of random rigid bodies
-and of packings, and prints how many are certified and the time that it takes. None of them changes which answers are certified.
+and of packings, and prints how many are certified and the time that it takes. None of them changes what a certificate means.
 Limits and tolerances that follow from rounding, from the literature or from a proof stand beside the code that uses them.
 """
 

@@ -24,6 +24,7 @@ from contactopt.problem import (
 from contactopt.problem.balance import escape, sentence
 from contactopt.problem.certificate import Moved
 from contactopt.problem.operators import InterfaceOperator, diagonal, loosened
+from contactopt.problem.stacked import Stacked
 from contactopt.solving.deadline import TimeUp, until
 from contactopt.solving.methods import Iterate, Known, Method, default_method, find_method, solvers_of, solves
 from contactopt.solving.notes import collected
@@ -155,6 +156,7 @@ def _run(
         {"solve": recorder.clock, "certificate": recorder.certified},
         message or status.sentence,
         proof=proof,
+        displacements=recorder.displacements,
     )
 
 
@@ -217,6 +219,7 @@ class _Recorder:
         self.problem, self.scales, self.tol, self.change_tol = problem, scales, tol, change_tol
         self.max_iterations, self.time_limit, self.progress = max_iterations, time_limit, progress
         self.reactions, self.multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
+        self.displacements: Stacked | None = None
         self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
         self.history: list[dict[str, float]] = []
         self.previous = self.reactions
@@ -231,8 +234,12 @@ class _Recorder:
         Where products cost iterations it is computed to a digit as long as it is far from the tolerance.
         """
         if known:
-            moved = replace(known[0], value=known[0].value * self.scales.length)
+            length = self.scales.length
+            moved = replace(known[0], value=known[0].value * length)
+            X = known[0].displacements
+            self.displacements = None if X is None else X * length
             return natural_map_residual(self.problem, self.reactions, self.multipliers, moved=moved)
+        self.displacements = None
         rough = loosened(self.problem.Q, ROUGH)
         if rough is not self.problem.Q:
             residual = natural_map_residual(replace(self.problem, Q=rough), self.reactions, self.multipliers)
@@ -240,6 +247,7 @@ class _Recorder:
                 return residual
         return natural_map_residual(self.problem, self.reactions, self.multipliers)
 
+    @np.errstate(all="ignore")  # numbers beyond the range of floats have no certificate
     def record(self, iterate: Iterate | Known, counts: dict[str, float]) -> Status | None:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
         r, lam, *known = iterate

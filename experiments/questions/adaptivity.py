@@ -139,8 +139,14 @@ def cylinder_files(folder: Path, size: float) -> tuple[Path, Path]:
 def cylinder(size: float, force: float) -> tuple[Scene, analytic.Reference]:
     """The scene of the two files, in mm and N, and Hertz's solution."""
     with TemporaryDirectory() as name:
-        upper, lower = (load_mesh(file, "mm") for file in cylinder_files(Path(name), size))
-    cylinder = Part("cylinder", upper, STEEL, (Support("top", {"x": 0.0}),), (Plate("top", {"y": -force}),), "arc")
+        upper, lower = (load_mesh(file) for file in cylinder_files(Path(name), size))
+
+    def circle(x: np.ndarray) -> np.ndarray:
+        middle = np.array([[0.0], [20.0]])
+        return middle + 20.0 * (x - middle) / np.linalg.norm(x - middle, axis=0)
+
+    held, load = (Support("top", {"x": 0.0}),), (Plate("top", {"y": -force}),)
+    cylinder = Part("cylinder", upper, STEEL, held, load, "arc", circle)
     block = Part("block", lower, STEEL, (Support("bottom"),), contact="top")
     exact = analytic.hertz_line(force, 20.0, analytic.contact_modulus(STEEL, STEEL))
     return Scene("cylinder on a block", cylinder, block, 0.0, law="frictionless"), exact
@@ -203,7 +209,7 @@ def stamp(height: float) -> Scene:
     gmsh.model.mesh.generate(2)
     with TemporaryDirectory() as name:
         gmsh.write(f"{name}/stamp.msh")
-        mesh = load_mesh(Path(name) / "stamp.msh", "mm")
+        mesh = load_mesh(Path(name) / "stamp.msh")
     gmsh.finalize()
     upper = Part("stamp", mesh, STEEL, loads=(Plate("top", {"x": 50.0, "y": -500.0}),), contact="foot")
     from contactopt.scenes.meshes import rename, tensor_mesh

@@ -28,7 +28,7 @@ CELLS = 16  # elements along each side of a block
 WALL = 2  # bricks in a row of a wall
 STONE, SOFT = Material(1000.0, 0.2), Material(200.0, 0.4)
 FLOOR = Rigid("floor", normal=(0, 1))
-REPEATS = 3
+REPEATS = 1
 
 
 def brick(name: str, left: float, bottom: float, width: float, force: tuple[float, float]) -> Part:
@@ -84,7 +84,7 @@ SCENES = {
 
 
 def measure(scene: Scene) -> dict[str, Any]:
-    """One row of the table: medians of processor seconds."""
+    """One row of the table: processor seconds."""
     reduced, solved = [], []
     for _ in range(REPEATS):
         start = time.process_time()
@@ -133,7 +133,7 @@ plate on every body of the highest row, rows of stiff and soft bodies by turns, 
 
 {runs}
 
-Seconds are those of the processor, one thread, medians of 3. Slopes are fits of log seconds over log bodies, from 4
+Seconds are those of the processor, one thread, of one run. Slopes are fits of log seconds over log bodies, from 4
 bodies on. A wall has 5 joints for 4 bodies, and 47 for 32: the slope over the number of joints leaves this out.
 
 {growth}

@@ -133,7 +133,9 @@ def efficiency(team: Team, case: str) -> dict[str, Any]:
 
 def traffic(team: Team, height: float) -> dict[str, Any]:
     """One slice of the foundation, or the punch, on each rank: what a product with Q sends, and the answer."""
-    scene = sliced(scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height), "foundation", team.size - 1)
+    scene = sliced(
+        scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height), "foundation", team.size - 1
+    )
     one, many = (reduce_bodies(given, Q="implicit", solver="superlu") for given in (scene, spread(scene, team)))
     r = np.random.default_rng(0).normal(size=many.problem.q.size)
     expected = one.problem.Q @ r
@@ -157,7 +159,9 @@ def traffic(team: Team, height: float) -> dict[str, Any]:
 
 def coupled_traffic(team: Team, height: float) -> dict[str, Any]:
     """The same bodies solved by multigrid: what the whole solution sends."""
-    scene = sliced(scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height), "foundation", team.size - 1)
+    scene = sliced(
+        scenes.flat_punch(2, elements=SLICED[team.size], foundation_height=height), "foundation", team.size - 1
+    )
     problem = reduce(spread(scene, team), solver="multigrid")
     before = (team.traffic.messages, team.traffic.length)
     solution = solve(problem, "newton", tol=TOL)

@@ -219,11 +219,11 @@ Lies: {lies}.
 """
 
 
-def main(cases: int) -> None:
+def report(results: list[tuple[str, str, str]]) -> None:
+    """Write what was found for the seeds 0, 1, ..."""
     from experiments.report import write
 
-    with ProcessPoolExecutor(PROCESSES) as pool:
-        results = list(pool.map(judge, range(cases), chunksize=50))
+    cases = len(results)
     statuses = sorted({status for _, status, _ in results})
     rows = []
     for family in FAMILIES:
@@ -248,4 +248,5 @@ def main(cases: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else CASES)
+    with ProcessPoolExecutor(PROCESSES) as pool:
+        report(list(pool.map(judge, range(int(sys.argv[1]) if len(sys.argv) > 1 else CASES), chunksize=50)))

@@ -28,6 +28,7 @@ TUTORIALS = (
     "a_load_cycle",
     "beat_our_solvers",
     "reading_a_strangers_problem",
+    "derivatives_with_kinks",
 )
 # reports about accuracy; all others are about performance
 ACCURACY = (
@@ -121,7 +122,7 @@ def command_line() -> str:
     commands = next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction)).choices
     pages = [f"# Command line\n\n{inspect.getdoc(contactopt.cli)}\n"]
     for name, command in commands.items():
-        command.formatter_class = partial(argparse.HelpFormatter, width=100)
+        command.formatter_class = partial(command.formatter_class, width=100)
         pages.append(f"## contactopt {name}\n\n```text\n{command.format_help()}```\n")
     return "\n".join(pages)
 

@@ -64,6 +64,13 @@ def solver_type(name: str, n: int, dim: int) -> type[BodySolver]:
     return kind
 
 
+def factors_of(name: str, dim: int) -> str:
+    """Name of the solver with factors that `name` stands for in a large body: 'auto' takes PARDISO in space where it is installed."""
+    if name in FACTORS_UP_TO:
+        return name
+    return "pardiso" if dim == 3 and find_spec("pypardiso") is not None else "superlu"
+
+
 def choose(n: int, dim: int, pardiso: bool = False) -> str:
     """Name of the cheapest solver for n unknowns in `dim` dimensions; `pardiso` says whether it is installed.
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 # `python -m experiments.questions.body_solvers` measures time and memory of every solver over the number of unknowns.
 PARDISO_FROM = 5_000  # unknowns of a 3D body from which PARDISO is faster than SuperLU
-FACTORS_UP_TO = {"superlu": 100_000, "pardiso": 200_000}  # unknowns of a 3D body that is factorised
+
+# `python -m experiments.questions.ways` compares whole solves; multigrid takes less than half the time of factors beyond these limits.
+FACTORS_UP_TO = {"superlu": 26_000, "pardiso": 70_000}  # unknowns of a 3D body that is factorised
 
 # `python -m experiments.questions.solver_constants` compares the elimination orders.
 LEAF = 48  # nodes of a piece of the mesh that nested dissection does not cut further
@@ -18,5 +20,8 @@ NEAR = 1.5  # neighbours at up to this multiple of the least distance are aggreg
 DEGREE = 3  # products with A in the smoother, which is a polynomial of this degree less one
 
 # Limits, not fitted.
+LARGE = 2**20  # entries of a matrix from which threads share its products; a product takes about a millisecond then
+SHARE = 4  # pieces of such a product for each core; whoever is free takes the next one
+GALERKIN = 8  # pieces of rows from which the matrix of the next level is summed up
 RTOL = 1e-10  # accuracy of an iterative solve when none is asked for
 MOST_ITERATIONS = 300  # conjugate gradient iterations before a solve is given up

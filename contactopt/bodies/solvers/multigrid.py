@@ -22,9 +22,11 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from contactopt.bodies.concurrency import Crew
 from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST_ITERATIONS, NEAR, RTOL
-from contactopt.bodies.solvers.products import SparseProduct
+from contactopt.bodies.solvers.products import BlockProduct, SparseProduct, galerkin
 from contactopt.bodies.solvers.system import (
+    Block,
     Iteration,
     System,
     asked,
@@ -55,8 +57,10 @@ class MultigridSolver:
 
     def __init__(self, system: System):
         self.trailing, self.n = system.trailing, system.A.shape[0]
-        self.A = SparseProduct(system.A)
-        self.cycle = VCycle(*system[:4])
+        crew = Crew()
+        block = isinstance(system.A, Block)
+        self.A = BlockProduct(system.A, crew) if block else SparseProduct(system.A, crew)
+        self.cycle = VCycle(*system[:4], crew)
 
     @property
     def complete(self) -> bool:
@@ -95,8 +99,8 @@ class Level:
 
     A: SparseProduct
     largest: np.floating
-    P: sp.csr_matrix
-    R: sp.csr_matrix
+    P: SparseProduct
+    R: SparseProduct
 
     def smooth(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x = p(A) r close to A^-1 r for the upper eigenvalues, p of degree DEGREE - 1; r - A x = r' - A z: x, r', z."""
@@ -117,10 +121,12 @@ class VCycle:
     scale     (n,) diag(A)^-1/2
     levels    finest first;   coarsest  the inverse of the last level's matrix
 
-    Arguments as in contactopt.bodies.solvers.system.System. Raises InputError if the package pyamg is missing.
+    Arguments as in contactopt.bodies.solvers.system.System, and the threads that share large products. Raises InputError if the package pyamg is missing.
     """
 
-    def __init__(self, A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, points: np.ndarray):
+    def __init__(
+        self, A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, points: np.ndarray, crew: Crew
+    ):
         blocks, self.place, present = nodal_blocks(A, node, component, len(points))
         self.scale = _inverse_root(A.diagonal())
         self.size = blocks.shape[0]
@@ -129,12 +135,16 @@ class VCycle:
         modes[np.setdiff1d(np.arange(self.size), self.place)] = 0.0
         scale = _inverse_root(blocks.diagonal())
         while points.shape[1] > COARSEST:
-            level = SparseProduct(_scaled(blocks, scale, scale))
+            level = SparseProduct(_scaled(blocks, scale, scale), crew)
             P, modes, points = coarsen(blocks, modes, points)
-            blocks = sp.bsr_matrix(P.T @ (blocks @ P))
+            blocks = galerkin(P, blocks, crew)
             coarse = _inverse_root(blocks.diagonal())
             P = _scaled(P, np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0), coarse).tocsr()
-            self.levels.append(Level(level, SINGLE(largest_eigenvalue(level)), P, P.T.tocsr()))
+            self.levels.append(
+                Level(
+                    level, SINGLE(largest_eigenvalue(level)), SparseProduct(P, crew), SparseProduct(P.T.tocsr(), crew)
+                )
+            )
             scale = coarse
         dense = blocks.toarray() * scale * scale[:, None]
         self.coarsest = la.pinvh(dense, rtol=1e-12).astype(SINGLE)
@@ -175,7 +185,7 @@ class Answer(NamedTuple):
     cycles: int
 
 
-def conjugate_gradients(A: SparseProduct, cycle: VCycle, load: np.ndarray, rtol: float) -> Answer:
+def conjugate_gradients(A: SparseProduct | BlockProduct, cycle: VCycle, load: np.ndarray, rtol: float) -> Answer:
     """Solution of A x = load by conjugate gradients with a V-cycle.
 
     It ends where (r' B r)^1/2, r the residual, has fallen by `rtol`.
@@ -267,7 +277,7 @@ def largest_eigenvalue(A: SparseProduct) -> float:
 
 
 def nodal_blocks(
-    A: sp.csr_matrix, node: np.ndarray, component: np.ndarray, dim: int
+    A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
     """A in blocks of nodes; its rows are made some at a time, for the copies take more than the result.
 

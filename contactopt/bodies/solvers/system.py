@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -13,10 +14,32 @@ from contactopt.errors import InputError
 from contactopt.problem.operators import Product
 
 
+@dataclass(frozen=True, eq=False)
+class Block:
+    """The rows and columns `kept` (n,) of a matrix `whole` (N, N), which are not copied."""
+
+    whole: sp.csr_matrix
+    kept: np.ndarray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return len(self.kept), len(self.kept)
+
+    def diagonal(self) -> np.ndarray:
+        return np.asarray(self.whole.diagonal()[self.kept])
+
+    def __rmatmul__(self, S: sp.csr_matrix) -> sp.csr_matrix:
+        """S A for a matrix S (m, n) with few rows."""
+        n, N = len(self.kept), self.whole.shape[0]
+        spread = sp.csr_matrix((np.ones(n), self.kept, np.arange(n + 1)), (n, N))
+        return sp.csr_matrix(((S @ spread) @ self.whole)[:, self.kept])
+
+
 class System(NamedTuple):
     """What the solvers of one body are made from. The matrix is not copied and must not change afterwards.
 
-    A          (n, n) stiffness on the free displacement unknowns, symmetric positive definite [force / length]
+    A          (n, n) stiffness on the free displacement unknowns, symmetric positive definite [force / length]; a Block is
+               for iterative solvers, which then share the entries with the body
     node       (n,) mesh node of each unknown;   component  (n,) its component, 0 .. dim - 1
     points     (dim, nodes) coordinates of the mesh nodes [length]
     trailing   (m,) unknowns whose block of the inverse is asked for (the contact unknowns), or None

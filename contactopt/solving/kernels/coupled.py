@@ -26,6 +26,7 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 from contactopt.problem.coupled import CoupledForm
 from contactopt.problem.stacked import Stacked, norm
+from contactopt.problem.threads import one_blas_thread
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.alart_curnier import coulomb_equations, glued_contacts, glued_projection
 from contactopt.solving.kernels.flexible import flexible_gmres
@@ -82,7 +83,7 @@ class Coupled:
     def step(self, at: State, right: Stacked, linearised: Linearised, rtol: float) -> State | None:
         """The state after Newton's step, or None if its linear system could not be solved."""
         form, V = self.form, self.equations.V
-        inverse = linearised.inverse(self.P, INNER)
+        inverse = linearised.rough(self.P)
         model = (lambda x: self.P @ x) if self.P.model is None else self.P.model.matvec
 
         def product(x: Stacked) -> Stacked:
@@ -114,7 +115,8 @@ class Coupled:
         energy = at.X.dot(form.pulled(r.ravel()) - missing)
         lacking = missing.dot(correction)
         accuracy = np.sqrt(lacking / energy) if energy > 0 else (np.inf if lacking else 0.0)
-        return r, at.multipliers, Moved(form.moved(at.X + correction, r.ravel()), float(accuracy))
+        better = at.X + correction
+        return r, at.multipliers, Moved(form.moved(better, r.ravel()), float(accuracy), better)
 
 
 def coupled_steps(
@@ -124,17 +126,20 @@ def coupled_steps(
     start: tuple[np.ndarray, np.ndarray] | None,
 ) -> Iterator[tuple[Known, float]]:
     """Newton's iterates with the residual of the equations that each step began with; ends where a step fails."""
-    P = fitted(model_of(problem, preconditioner, deflate=False), form)
-    coupled = Coupled(coulomb_equations(problem), form, P)
-    at = _bonded(problem, coupled) if start is None else State(in_equilibrium(form, start[0]), *start)
+    with one_blas_thread():
+        P = fitted(model_of(problem, preconditioner, deflate=False), form)
+        coupled = Coupled(coulomb_equations(problem), form, P)
+        at = _bonded(problem, coupled) if start is None else State(in_equilibrium(form, start[0]), *start)
     last = np.inf
     while at is not None:
-        right, linearised = coupled.linearised(at)
-        residual = coupled.size(right)
-        error = parted(right)[1].reshape(at.r.shape)
-        yield coupled.judged(at, error), residual
+        with one_blas_thread():
+            right, linearised = coupled.linearised(at)
+            residual = coupled.size(right)
+            known = coupled.judged(at, parted(right)[1].reshape(at.r.shape))
+        yield known, residual
         rtol = min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else FIRST
-        at, last = coupled.step(at, right, linearised, rtol), residual
+        with one_blas_thread():
+            at, last = coupled.step(at, right, linearised, rtol), residual
 
 
 def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:

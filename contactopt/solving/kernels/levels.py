@@ -356,7 +356,7 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
         for shift, share in zip(shifts, shares)
         if share.any()
     ]
-    free = turned(np.asarray(1 - sum(shares)))
+    free = turned(1 - np.sum(shares, axis=0))
 
     def apply(x: np.ndarray) -> np.ndarray:
         parts = x.reshape(c, m)

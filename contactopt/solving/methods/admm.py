@@ -38,7 +38,13 @@ WORTH = 2.0  # smallest factor that is worth a factorisation
 
 @dataclass(frozen=True)
 class ADMM:
-    """rho: first weight of r = z, in units of the mean compliance; balanced later."""
+    """The alternating direction method of multipliers on r = z.
+
+    Parameters
+    ----------
+    rho
+        First weight of r = z, in units of the mean compliance. The iteration balances it later.
+    """
 
     rho: float = 1.0
     sparse: ClassVar[bool] = True  # takes a sparse Q
@@ -79,7 +85,7 @@ class ADMM:
 
 
 class Balanced:
-    """(Q + rho I) r + V lambda = right, V' r + s = 0, factorised."""
+    """The solution of (Q + rho I) r + V lambda = right, V' r + s = 0, with a matrix that is factorised once."""
 
     def __init__(self, problem: InterfaceProblem, rho: float):
         self.V = problem.V

@@ -35,9 +35,18 @@ PCG = "pcg"  # the backend that needs no entry of Q
 
 @dataclass(frozen=True)
 class Alternating:
-    """normal, tangential: names of the backends; tangential None is proxqp for intervals, clarabel for discs.
+    """The alternating iteration of the paper: a normal and a tangential convex program in turn.
 
-    relaxation in (0, 1]: the fraction of each new tangential force that is taken; preconditioner: of the backend `pcg`.
+    Parameters
+    ----------
+    normal
+        Name of the backend of the normal program.
+    tangential
+        Name of the backend of the tangential program. None: proxqp for intervals, clarabel for discs.
+    relaxation
+        Fraction of each new tangential force that is taken, above 0 and at most 1.
+    preconditioner
+        Of the backend 'pcg', which needs products with Q only.
     """
 
     normal: str = "proxqp"

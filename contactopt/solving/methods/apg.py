@@ -35,7 +35,7 @@ ROUNDS = 20  # of disc_qp
 
 @dataclass(frozen=True)
 class APG:
-    """No settings: the step comes from Q's largest eigenvalue."""
+    """Accelerated projected gradients. There are no settings: the step follows from the largest eigenvalue of Q."""
 
     sparse: ClassVar[bool] = True  # takes a sparse Q
 

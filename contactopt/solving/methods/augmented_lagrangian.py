@@ -37,7 +37,15 @@ from contactopt.solving.methods.proximal import proximal_equations
 
 @dataclass(frozen=True)
 class AugmentedLagrangian:
-    """rho: penalty of the exact variant in units of 1 over the mean compliance; explicit: Uzawa's variant, own rho."""
+    """The augmented Lagrangian method, exact or in the variant of Uzawa.
+
+    Parameters
+    ----------
+    rho
+        Penalty of the exact variant, in units of one over the mean compliance.
+    explicit
+        Whether to take the variant of Uzawa, which chooses its own penalty.
+    """
 
     rho: float = 100.0
     explicit: bool = False

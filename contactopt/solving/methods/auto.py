@@ -60,7 +60,14 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Auto:
-    """preconditioner: of Newton's steps where Q is an operator; None: the best that fits the contacts."""
+    """The default method. It has no number to choose.
+
+    Parameters
+    ----------
+    preconditioner
+        Of Newton's steps where Q is known by its products: a name in contactopt.solving.preconditioners, or 'none'.
+        None: the best that fits the contacts.
+    """
 
     preconditioner: str | None = None
     implicit: ClassVar[bool] = True

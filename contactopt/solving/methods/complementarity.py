@@ -32,7 +32,10 @@ PIVOT, TIE = 1e-10, 1e-12  # least pivot; relative distance of equal ratios
 
 @dataclass(frozen=True)
 class Lemke:
-    """No settings. InputError in 3D and for more than 300 contacts."""
+    """Lemke's method on the linear complementarity problem, for plane problems. It has no settings.
+
+    It raises InputError in 3D and for more than 300 contacts.
+    """
 
     def solves(self, law: Law) -> bool:
         return law.unilateral and law.proportional and not law.dilatant

@@ -38,9 +38,14 @@ BRIDGES = ("clarabel", "cvxpy")
 
 @dataclass(frozen=True)
 class AcaryCadoux:
-    """bridge   'clarabel' calls that solver directly; 'cvxpy' solves contactopt.models.acary_cadoux as written there
+    """The fixed point of Acary and Cadoux: one cone program after another.
 
-    backend  the conic backend behind cvxpy; the direct bridge knows clarabel only
+    Parameters
+    ----------
+    bridge
+        'clarabel' calls that solver directly; 'cvxpy' solves contactopt.models.acary_cadoux as it is written there.
+    backend
+        The conic backend behind cvxpy. The direct bridge knows clarabel only.
     """
 
     bridge: str = "clarabel"
@@ -69,7 +74,7 @@ class AcaryCadoux:
 
 @dataclass(frozen=True)
 class Relaxation(AcaryCadoux):
-    """The settings of AcaryCadoux; one answer, that of associated friction."""
+    """One cone program, whose solution is that of associated friction. It has the settings of AcaryCadoux."""
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         return islice(super().iterate(problem), 1)

@@ -37,7 +37,13 @@ ROUGH = 1e-4  # of the normal problem, before the active set steps
 
 @dataclass(frozen=True)
 class Lagrangian:
-    """relaxation in (0, 1]: the fraction of each new tangential force that is taken."""
+    """Uzawa's iteration on the friction forces inside the two-stage iteration.
+
+    Parameters
+    ----------
+    relaxation
+        Fraction of each new tangential force that is taken, above 0 and at most 1.
+    """
 
     relaxation: float = 1.0
 

@@ -47,10 +47,16 @@ SHARP = 1e-4  # accuracy of a residual, over the residual that the step aimed at
 
 @dataclass(frozen=True)
 class Newton:
-    """linear: 'dense', 'krylov', which needs products with Q only, or 'coupled', which iterates on the bodies at once.
+    """Newton's method on the equations of Alart and Curnier.
 
-    None: dense for an array Q, coupled where the bodies are solved by iteration, krylov for other operators.
-    preconditioner of the last two: a name (see contactopt.solving.preconditioners) or 'none'; None: the best that fits the contacts.
+    Parameters
+    ----------
+    linear
+        'dense', 'krylov', which needs products with Q only, or 'coupled', which iterates on the bodies at once. None:
+        dense for an array Q, coupled where the bodies are solved by iteration, and krylov for other operators.
+    preconditioner
+        Of 'krylov' and 'coupled': a name in contactopt.solving.preconditioners, or 'none'. None: the best that fits
+        the contacts.
     """
 
     linear: str | None = None

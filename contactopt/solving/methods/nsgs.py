@@ -37,7 +37,13 @@ OFTEN = 100  # contacts between two looks at the clock
 
 @dataclass(frozen=True)
 class NSGS:
-    """relaxation in (0, 2): the fraction of each local change that is taken."""
+    """Nonsmooth Gauss-Seidel: the law at one contact after another.
+
+    Parameters
+    ----------
+    relaxation
+        Fraction of each local change that is taken, between 0 and 2.
+    """
 
     relaxation: float = 1.0
     sparse: ClassVar[bool] = True  # takes a sparse Q

@@ -33,9 +33,15 @@ EXACT = 1e-3  # certificate of the regularised problem, relative to the error 1 
 
 @dataclass(frozen=True)
 class Penalty:
-    """factor, tangential_factor: stiffness of the penalty per node, in units of 1 over the mean compliance.
+    """The penalty method. The regularised problem is solved by `auto`.
 
-    The default makes a certificate of about 1e-6. tangential_factor None: exact friction.
+    Parameters
+    ----------
+    factor
+        Stiffness of the penalty of each node, in units of one over the mean compliance. The default makes a
+        certificate of about 1e-6.
+    tangential_factor
+        The same along the surface. None: friction is exact.
     """
 
     factor: float = 1e6

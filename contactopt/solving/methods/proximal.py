@@ -31,7 +31,13 @@ LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6  # of the proximal term; where even th
 
 @dataclass(frozen=True)
 class Proximal:
-    """alpha: first weight of the proximal term, in units of the mean compliance."""
+    """The proximal point method, whose subproblems are solved by Newton's method.
+
+    Parameters
+    ----------
+    alpha
+        First weight of the proximal term, in units of the mean compliance.
+    """
 
     alpha: float = 1e-3
     sparse: ClassVar[bool] = True  # takes a sparse Q

@@ -32,9 +32,14 @@ from contactopt.solving.methods import Iterate
 
 @dataclass(frozen=True)
 class Tresca:
-    """backend: name of the QP backend in 2D (None: proxqp), of the conic backend in 3D (None: clarabel).
+    """The fixed point of Tresca: convex programs with friction bounds of the solution before.
 
-    relaxation in (0, 1]: the fraction of each change of the friction bounds that is taken.
+    Parameters
+    ----------
+    backend
+        Name of the QP backend in 2D and of the conic backend in 3D. None: proxqp and clarabel.
+    relaxation
+        Fraction of each change of the friction bounds that is taken, above 0 and at most 1.
     """
 
     backend: str | None = None

@@ -6,13 +6,17 @@ contacts by
 
     G r = M^-1/2 L^-1/2 M^-1/2 r,   L = M^-1/2 K M^-1/2 + shift,   P = M^1/2 L^1/2 M^1/2.
 
+On a surface in space this is what normal forces do. Tangential ones have two directions: waves along their own direction
+meet more resistance than waves across it. There K is the stiffness of the form  grad u : grad v + ALONG div u div v  for
+tangential fields u and v, which couples both components.
+
 At an edge M is what a contact inside would have, and the share of it that is there enters with the power EDGE, as in
 `neumann`. The shift keeps constants, which a Neumann Laplacian maps to zero; it belongs to each connected piece of the surface.
 Components that cannot move are left out. The inverse root is a rational function whose error falls exponentially with the
 number of its poles: each of them is one sparse factorisation of a matrix of the surface.
 
 Source: Hale, Higham, Trefethen (2008), Computing A^alpha, log(A), and related matrix functions by contour integrals,
-method 3 for the square root.
+method 3 for the square root. Johnson (1985), Contact mechanics, section 3.6, for the compliance of the half-space.
 """
 
 from __future__ import annotations
@@ -27,10 +31,13 @@ from scipy.special import ellipj, ellipk, ellipkm1
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
-from contactopt.solving.preconditioners.constants import EDGE
+from contactopt.solving.preconditioners.constants import ALONG, EDGE, SPLIT
 
 ACCURACY = 1e-4  # of the rational function
 THINNEST = 1e-2  # nodal area over mass, relative to the mean, of a contact on an axis
+DISTORTED = np.log(
+    2
+)  # of the area of a cell in the chart over that in space: beyond, the chart has no directions there
 PIECE = 0.25  # shift over the least eigenvalue of a piece of the surface that is as long as this one
 
 Act = Callable[[np.ndarray], np.ndarray]
@@ -61,23 +68,29 @@ def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
         raise InputError(
             "the preconditioner 'laplacian' needs the cells of the contact surface, which are not known here."
         )
-    own = len(problem.coordinates) == problem.dim
-    K, mass, shift, share = surface_matrices(problem.coordinates if own else problem.chart.places, cells)
+    points = problem.coordinates if len(problem.coordinates) == problem.dim else problem.chart.places
+    K, mass, shift, share = surface_matrices(points, cells)
     # Forces are spread over the nodal areas, which differ from the mass where the surface goes around an axis.
     depth = problem.areas / mass
     depth = np.maximum(depth / depth.mean(), THINNEST)
-    patterns, which = np.unique(held, axis=1, return_inverse=True)
-    roots = [
-        (~pattern, which.ravel() == i, square_root(K, mass, shift, share, depth, ~pattern))
-        for i, pattern in enumerate(patterns.T)
-        if not pattern.all()
-    ]
+    normal, tangential = slice(0, 1), slice(1, problem.dim)
+    roots = [(normal, 1.0 - SPLIT, K), (tangential, 1.0, K)]
+    if problem.dim == 3:
+        vector = sp.kron(K, sp.identity(2), format="csr") + ALONG * divergences(points, problem.chart.places, cells)
+        roots[1] = (tangential, 1.0, vector)
+    made = []
+    for components, factor, matrix in roots:
+        moves = ~held[:, components]
+        if moves.any():
+            values = np.repeat([mass, shift, share, depth], moves.shape[1], axis=1)
+            made.append((components, moves, factor, square_root(matrix, values, moves.ravel())))
 
     def product(X: np.ndarray, inverse: bool) -> np.ndarray:
         out = np.zeros(X.shape)
-        for moves, components, root in roots:
-            there = np.ix_(moves, components)
-            out[there] = root[inverse](X[there])
+        for components, moves, factor, root in made:
+            own = np.zeros(moves.shape)
+            own[moves] = root[inverse](X[:, components][moves]) * (factor if inverse else 1 / factor)
+            out[:, components] = own
         return out
 
     signs = np.where(np.random.default_rng(0).random(held.shape) < 0.5, -1.0, 1.0) * ~held
@@ -94,13 +107,9 @@ def surface_matrices(points: np.ndarray, cells: np.ndarray) -> tuple[sp.csr_matr
     points : (d, k) positions [length]
     cells : (v, c) corners of lines, triangles or quadrilaterals, which stand for the mean of both ways to cut them
     """
-    k, v = points.shape[1], len(cells)
-    if v == 2 or v == 3:
-        pieces, part = [cells], 1.0
-    else:
-        pieces, part = [cells[list(corners)] for corners in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))], 0.5
+    k = points.shape[1]
     K, mass, share = sp.csr_matrix((k, k)), np.zeros(k), np.zeros(k)
-    for corners in pieces:
+    for corners, part in _cut(cells):
         gradients, measure = _simplices(points, corners)
         for i, own in enumerate(corners):
             np.add.at(mass, own, part * measure / len(corners))
@@ -114,6 +123,37 @@ def surface_matrices(points: np.ndarray, cells: np.ndarray) -> tuple[sp.csr_matr
     lengths = [np.linalg.norm(np.ptp(points[:, piece == i], axis=1)) for i in range(piece.max() + 1)]
     # The least eigenvalue of a convex surface is at least (pi / diameter)^2 (Payne, Weinberger 1960).
     return K, mass, PIECE * (np.pi / np.array(lengths)[piece]) ** 2, np.minimum(share, 1.0)
+
+
+def divergences(points: np.ndarray, places: np.ndarray, cells: np.ndarray) -> sp.csr_matrix:
+    """The matrix (2k, 2k) of the integral of div u div v for tangential fields u and v, the components of a contact in a row.
+
+    Parameters
+    ----------
+    points : (3, k) or (2, k) positions in space [length]
+    places : (2, k) positions in the chart, along whose axes the components are [length]
+    cells : (v, c) as for surface_matrices. Those whose area differs by DISTORTED in the chart, as at its seam, are left out.
+    """
+    k = places.shape[1]
+    total = sp.csr_matrix((2 * k, 2 * k))
+    for corners, part in _cut(cells):
+        gradients, measure = _simplices(places, corners)
+        true = _simplices(points, corners)[1]
+        measure = np.where(np.abs(np.log(np.maximum(measure, 1e-300) / true)) < DISTORTED, measure, 0.0)
+        for i, own in enumerate(corners):
+            for j, other in enumerate(corners):
+                for a in range(2):
+                    for b in range(2):
+                        entries = part * measure * gradients[i][a] * gradients[j][b]
+                        total = total + sp.csr_matrix((entries, (2 * own + a, 2 * other + b)), (2 * k, 2 * k))
+    return total
+
+
+def _cut(cells: np.ndarray) -> list[tuple[np.ndarray, float]]:
+    """Corners of lines or triangles, and the weight with which they count: quadrilaterals are cut both ways, half each."""
+    if len(cells) < 4:
+        return [(cells, 1.0)]
+    return [(cells[list(corners)], 0.5) for corners in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))]
 
 
 def _angle(x: np.ndarray) -> np.ndarray:
@@ -139,15 +179,17 @@ def _simplices(points: np.ndarray, corners: np.ndarray) -> tuple[list[np.ndarray
     return [-second - third, second, third], np.sqrt(square) / 2
 
 
-def square_root(
-    K: sp.csr_matrix, mass: np.ndarray, shift: np.ndarray, share: np.ndarray, depth: np.ndarray, moves: np.ndarray
-) -> Root:
-    """Products with P and with G on the contacts of the mask `moves` (k,)."""
-    full = mass[moves] / share[moves]
-    weight = (np.sqrt(full * depth[moves]) * share[moves] ** EDGE)[:, None]
+def square_root(K: sp.csr_matrix, values: np.ndarray, moves: np.ndarray) -> Root:
+    """Products with P and with G on the unknowns of the mask `moves` (n,), for K (n, n).
+
+    values  (4, n) mass, shift, share and depth of the contact of each unknown
+    """
+    mass, shift, share, depth = values[:, moves]
+    full = mass / share
+    weight = np.sqrt(full * depth) * share**EDGE
     scale = sp.diags(full**-0.5)
-    L = sp.csc_matrix(scale @ K[moves][:, moves] @ scale + sp.diags(shift[moves]))
-    low, high = float(shift[moves].min()), float(abs(L).sum(axis=1).max())
+    L = sp.csc_matrix(scale @ K[moves][:, moves] @ scale + sp.diags(shift))
+    low, high = float(shift.min()), float(abs(L).sum(axis=1).max())
     eye = sp.eye(L.shape[0], format="csc")
     order = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
     poles = [(c, splu(L + s * eye, **order)) for c, s in zip(*inverse_root(low, high))]

@@ -72,7 +72,8 @@ The same with 64 waves along a side at most, without friction and with it:
 ## Tamaas
 
 The same gap, load and tolerance, given to Tamaas' solver of Polonsky, Keer and Rey with its own stopping rule; both run one after
-the other. Both answers are judged by the certificate here. Tamaas' model holds what belongs to it before the solve.
+the other. Both answers are judged by the certificate here. The time to make Tamaas' model is not counted, that to make the problem here is
+given beside the solve.
 
 {tamaas}
 

@@ -22,17 +22,11 @@ WIDE = 40.0  # radius of the block, over the contact radius
 
 def chart_rows() -> list[Row]:
     """Hertz's pressure by finite elements and by half-spaces: error in L2 over CPU seconds."""
-    rows = []
-    for elements in (8, 16, 32, 64):
-        rows.append(
-            _pressure_error("finite elements, axisymmetric", scenes.sphere(rigid="sphere", mu=0.0, elements=elements))
-        )
-    for elements in (4, 6):
-        rows.append(_pressure_error("finite elements, 3D", scenes.cattaneo(3, shear=0.0, mu=0.1, elements=elements)))
-    for elements in (8, 16, 32, 64, 128):
-        rows.append(_pressure_error("half-space, 3D", scenes.hertz_half_space(elements=elements)))
-        rows.append(_pressure_error("half-plane, 2D", _line(elements)))
-    return rows
+    cases = [("finite elements, axisymmetric", scenes.sphere(rigid="sphere", mu=0.0, elements=n)) for n in (8, 16, 32)]
+    cases += [("half-space, 3D", scenes.hertz_half_space(elements=n)) for n in (8, 16, 32, 64, 128)]
+    cases += [("half-plane, 2D", _line(n)) for n in (8, 16, 32, 64, 128)]
+    cases += [("finite elements, 3D", scenes.cattaneo(3, shear=0.0, mu=0.1, elements=n)) for n in (3, 4)]
+    return [_pressure_error(*case) for case in cases]
 
 
 def _line(elements: int) -> Scene:
@@ -51,8 +45,10 @@ def _pressure_error(name: str, scene: Scene) -> Row:
     exact = scene.reference.pressure(distance)
     pressure, w = solution.reactions[:, 0] / np.maximum(problem.areas, 1e-300), problem.areas
     error = np.sqrt(np.sum(w * (pressure - exact) ** 2) / np.sum(w * exact**2))
-    return {"model": name, "elements a radius": scene.elements, "contacts": problem.contacts, "pressure in L2": error,
-            "CPU s": seconds}  # fmt: skip
+    row: Row = {"model": name, "elements a radius": scene.elements, "contacts": problem.contacts}
+    row |= {"pressure in L2": error, "CPU s": seconds}
+    print(row, flush=True)  # long runs show how far they are
+    return row
 
 
 def _answer(scene: Scene) -> tuple[Any, Solution]:

@@ -40,7 +40,8 @@ Hertz, line and point. `p in L2` is the error at the contacts, with their areas,
 
 {hertz}
 
-Lame's press fit (a quarter, interference 1/200 of the radius; isoparametric elements if quadratic), with the true circles known:
+Lame's press fit (a quarter, interference 1/200 of the radius; isoparametric elements if quadratic), with the true circles known.
+There is no friction in the exact solution, whatever mu; `friction, largest` is that of any contact, over the pressure:
 
 {press_fits}
 
@@ -49,10 +50,10 @@ with an elastic punch 1e7 times as stiff, whose mesh does not match:
 
 {rigid_punch}
 
-Cattaneo and Mindlin: cylinders pressed, then sheared in one step; root mean squares over three shears, whose own errors
-follow. The meshes have nodes at the edges of stick and contact, which matching nodes turn to account: both bodies have
-the same kinks there. Where they do not match, linear elements do better with the contacts on the coarser side for the traction,
-on the finer side for the pressure; for quadratic ones the finer side serves both:
+Cattaneo and Mindlin: cylinders pressed, then sheared in one step; root mean squares over shears, and their ratios to those of
+matching meshes of 20:20. Where the meshes have nodes at the edges of stick (three shears, each with its meshes), matching nodes turn
+this to account, because both bodies have the same kinks there, and the fine side does not. Nodes anywhere: four shears on
+meshes made for another one.
 
 {cattaneo}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ METHODS = ("newton", "auto")
 FINE = 192
 SIZES = ((16, 16), (24, 24), (16, 24), (24, 16), (32, 32), (48, 48), (32, 48))
 SHEARS = (10.0, 30.0, 45.0)
+OTHERS = (5.0, 15.0, 25.0, 35.0)
 
 
 def hertz() -> list[dict[str, Any]]:
@@ -54,26 +56,21 @@ def hertz() -> list[dict[str, Any]]:
 
 def press_fits() -> list[dict[str, Any]]:
     rows = []
-    for degree in (2, 1):
+    for degree, mu in ((2, 0.0), (1, 0.0), (2, 0.15), (1, 0.15)):
         for carrier in ("lower", "upper"):
             last = None
             for n in (8, 16, 32):
-                scene, exact = press_fit((n, 3 * n // 2), degree, carrier)
+                scene, exact = press_fit((n, 3 * n // 2), degree, carrier, mu)
                 problem = reduce_bodies(scene).problem
-                p = solve(problem).reactions[:, 0] / problem.areas
+                reactions = solve(problem).reactions
+                p, q = (reactions / problem.areas[:, None]).T
                 off = error(p, np.full(len(p), exact), problem.areas), float(np.abs(p / exact - 1).max())
-                row: dict[str, Any] = {
-                    "degree": degree,
-                    "contacts on": "fine side" if carrier == "lower" else "coarse side",
-                }
+                row: dict[str, Any] = {"degree": degree, "mu": mu}
+                row |= {"contacts on": "fine side" if carrier == "lower" else "coarse side"}
                 row |= {"elements": f"{n}:{3 * n // 2}", "p in L2": off[0], "p, largest": off[1]}
-                row |= {f"order {i}": "" if last is None else float(np.log2(last[i] / off[i])) for i in (0, 1)}
-                rows.append(
-                    {
-                        k.replace("order 0", "order in L2").replace("order 1", "order of the largest"): v
-                        for k, v in row.items()
-                    }
-                )
+                orders = ("", "") if last is None else tuple(float(np.log2(a / b)) for a, b in zip(last, off))
+                row |= {"order in L2": orders[0], "order of the largest": orders[1]}
+                rows.append(row | {"friction, largest": float(np.abs(q).max() / exact)})
                 last = off
     return rows
 
@@ -127,9 +124,19 @@ def steps(found: dict[str, Any]) -> dict[str, Any]:
     return {"newton: steps": newton.iterations, "newton": newton.status.label, "auto": auto.status.label}
 
 
-def sheared(sizes: tuple[int, int], degree: int, shear: float, carrier: str | None) -> tuple[float, float, bool]:
-    """Cattaneo and Mindlin's cylinders pressed, then sheared: L2 errors of pressure and traction."""
-    scene = apart(scenes.cattaneo(2, shear=shear), *sizes, degree)
+def sheared(
+    sizes: tuple[int, int], degree: int, shear: float, carrier: str | None, made: float | None = None
+) -> tuple[float, float, bool]:
+    """Cattaneo and Mindlin's cylinders pressed, then sheared: L2 errors of pressure and traction.
+
+    made  the shear for which the meshes have nodes at the edges of stick; None: the same
+    """
+    scene = scenes.cattaneo(2, shear=shear)
+    if made is not None:
+        other = scenes.cattaneo(2, shear=made)
+        parts = {side: replace(getattr(scene, side), mesh=getattr(other, side).mesh) for side in ("upper", "lower")}
+        scene = replace(scene, **parts)
+    scene = apart(scene, *sizes, degree)
     states = [_sheared(scene, share) for share in (0.0, 1.0)]
     path = follow(states if carrier is None else [carried(state, carrier) for state in states])
     problem, r = path.reduction.problem, path.solution.reactions
@@ -139,18 +146,27 @@ def sheared(sizes: tuple[int, int], degree: int, shear: float, carrier: str | No
 
 
 def cattaneo() -> list[dict[str, Any]]:
-    """Root mean squares of both errors over several shears, each on meshes made for it."""
+    """Root mean squares of both errors over several shears, each on meshes made for it, and on meshes made for another one."""
     rows = []
-    for degree in (1, 2):
-        for sizes in ((16, 16), (24, 24), (16, 24), (24, 16)):
-            carriers: tuple[str | None, ...] = (None,) if sizes[0] == sizes[1] else ("upper", "lower")
-            for carrier in carriers:
-                found = [sheared(sizes, degree, shear, carrier) for shear in SHEARS]
-                own, other = sizes if carrier == "upper" else sizes[::-1]
-                on = "matching nodes" if own == other else "fine side" if own > other else "coarse side"
-                row: dict[str, Any] = {"degree": degree, "elements": f"{sizes[0]}:{sizes[1]}", "contacts on": on}
-                row |= {"p in L2": float(np.sqrt(np.mean([f[0] ** 2 for f in found])))}
-                row |= {"q in L2": float(np.sqrt(np.mean([f[1] ** 2 for f in found])))}
-                row |= {f"q at T = {shear:g} N": found[i][1] for i, shear in enumerate(SHEARS)}
-                rows.append(row | {"solved": all(f[2] for f in found)})
+    for made, shears in ((None, SHEARS), (45.0, OTHERS)):
+        for degree in (1, 2):
+            base: np.ndarray | None = None
+            for sizes in ((20, 20), (16, 24), (24, 16)):
+                carriers: tuple[str | None, ...] = (None,) if sizes[0] == sizes[1] else ("upper", "lower")
+                for carrier in carriers:
+                    found = [sheared(sizes, degree, shear, carrier, made) for shear in shears]
+                    rms = np.sqrt(_squares(found))
+                    base = rms if base is None else base
+                    own, other = sizes if carrier == "upper" else sizes[::-1]
+                    on = "matching nodes" if own == other else "fine side" if own > other else "coarse side"
+                    nodes = "at the edges of stick" if made is None else "anywhere"
+                    row: dict[str, Any] = {"nodes": nodes, "degree": degree, "elements": f"{sizes[0]}:{sizes[1]}"}
+                    row |= {"contacts on": on, "p in L2": float(rms[0]), "q in L2": float(rms[1])}
+                    row |= {"p over 20:20": float(rms[0] / base[0]), "q over 20:20": float(rms[1] / base[1])}
+                    rows.append(row | {"solved": all(f[2] for f in found)})
     return rows
+
+
+def _squares(found: list[tuple[float, float, bool]]) -> np.ndarray:
+    """Mean squares (2,) of the errors of pressure and traction."""
+    return np.asarray(np.mean(np.array([f[:2] for f in found]) ** 2, axis=0))

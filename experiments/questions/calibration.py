@@ -1,0 +1,179 @@
+"""Are friction and stiffness found from a Cattaneo-Mindlin loop, are the intervals honest, and where is mu not in the data?"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+import contactopt
+from contactopt import HalfSpace, Material, plots
+from contactopt.derivatives.outputs import seeds_of
+from contactopt.derivatives.parameters import parameter, put_all
+from contactopt.derivatives.states import along, solved_chain
+from experiments.report import write
+
+E, MU, FORCE = 5.0, 0.5, 100.0  # MPa, -, N
+RADIUS, THICK, REACH, DEPTH = 4000.0, 400.0, 32.0, 1000.0  # mm; the half-width of contact is about 22
+LOADS = (0.0, 16.0, 30.0, 42.0, 14.0, -16.0, -42.0, -14.0, 16.0, 42.0)
+NOISE = 0.01  # of the largest shift
+REPEATS = 100
+START = {"E": 6.5, "mu": 0.7}
+AMPLITUDES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
+FRICTIONS = (0.2, 0.35, 0.5, 0.7)
+
+
+def loop(cells: int, loads: Sequence[float] = LOADS) -> list[contactopt.Scene]:
+    """Two equal cylinders as half-planes; the upper one is pressed, and pushed by one load after the other."""
+    x = REACH * (2 * np.arange(cells) + 1 - cells) / cells
+    upper = HalfSpace(
+        "upper",
+        Material(E, 0.3),
+        x,
+        lambda place: -(place[0] ** 2) / (2 * RADIUS),
+        {"x": 0.0, "y": -FORCE},
+        depth=DEPTH,
+    )
+    lower = HalfSpace("lower", Material(E, 0.3), x, depth=DEPTH)
+    scene = contactopt.Scene("cylinders", upper, lower, MU, thickness=THICK, units=("mm", "MPa"))
+    push = parameter("force:upper:x", scene)
+    return [push.put(scene, load) for load in loads]
+
+
+def shifts(states: list[contactopt.Scene]) -> np.ndarray:
+    return np.array([seeds_of("shift", step).value for step in solved_chain(states, 1e-12, Q="explicit").steps])
+
+
+def row(name: str, found: contactopt.Fit) -> dict[str, Any]:
+    return {
+        "data": name,
+        "E": found.values["E"],
+        "error of E": abs(found.values["E"] / E - 1),
+        "mu": found.values["mu"],
+        "error of mu": abs(found.values["mu"] / MU - 1),
+        "evaluations": found.evaluations,
+        "largest certificate": max(found.certificates),
+        "singular values": ", ".join(f"{s:.3g}" for s in found.singular),
+    }
+
+
+def clean() -> list[dict[str, Any]]:
+    states = loop(40)
+    rows = [
+        row("the same grid", contactopt.fit(states, {"shift": shifts(states)}, ("E", "mu"), start=START, Q="explicit"))
+    ]
+    finer = shifts(loop(160))
+    rows.append(
+        row("a grid 4 times finer", contactopt.fit(states, {"shift": finer}, ("E", "mu"), start=START, Q="explicit"))
+    )
+    return rows
+
+
+def repetitions() -> tuple[list[dict[str, Any]], contactopt.Fit]:
+    """How often the intervals of 95 % hold the truth, with a known noise."""
+    states, rng = loop(24), np.random.default_rng(19)
+    exact = shifts(states)
+    sigma = NOISE * float(np.abs(exact).max())
+    rows = []
+    hits, evaluations, begin = np.zeros(2), 0, time.process_time()
+    for _ in range(REPEATS):
+        data = {"shift": exact + sigma * rng.normal(size=len(exact))}
+        found = contactopt.fit(states, data, ("E", "mu"), start=START, noise=sigma, Q="explicit")
+        evaluations += found.evaluations
+        hits += [low <= truth <= high for truth, (low, high) in zip((E, MU), found.intervals.values())]
+    rows.append(
+        {
+            "noise": "known",
+            "repetitions": REPEATS,
+            "E in its interval": int(hits[0]),
+            "mu in its interval": int(hits[1]),
+            "evaluations each": evaluations / REPEATS,
+            "CPU [s] each": (time.process_time() - begin) / REPEATS,
+        }
+    )
+    return rows, found
+
+
+def knowledge() -> tuple[list[dict[str, Any]], np.ndarray]:
+    """Standard deviation of mu, relative, from half a loop of the amplitude T = share mu P, data with NOISE of their largest shift."""
+    out, rows = np.zeros((len(FRICTIONS), len(AMPLITUDES))), []
+    for i, mu in enumerate(FRICTIONS):
+        for j, share in enumerate(AMPLITUDES):
+            top = share * mu * FORCE
+            states = [put_all(s, {parameter("mu", s): mu}) for s in loop(32, np.linspace(0.0, 1.0, 5) * top)]
+            chain = solved_chain(states, 1e-10, Q="explicit")
+            seeds = [seeds_of("shift", step) for step in chain.steps]
+            sigma = NOISE * max(abs(seed.value) for seed in seeds)
+            which = [parameter(name, states[0]) for name in ("E", "mu")]
+            J = [[along(s, m, {one: 1.0}) for s, m in zip(seeds, chain.forward({one: 1.0}))] for one in which]
+            scaled = np.array(J).T / sigma * [E, mu]
+            slipping = int(chain.steps[-1].problem.law.slipping(chain.steps[-1].solution.reactions).sum())
+            singular = np.linalg.svd(scaled, compute_uv=False)
+            blind = not singular[1] > 1e-8 * singular[0]
+            out[i, j] = np.inf if blind else float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[1, 1]))
+            if mu == MU:
+                rows.append(
+                    {"T / (mu P)": share, "contacts that slip": slipping, "relative deviation of mu": out[i, j]}
+                )
+    return rows, out
+
+
+def figure(deviation: np.ndarray, found: contactopt.Fit) -> Any:
+    from matplotlib.figure import Figure
+
+    made = Figure(figsize=(10.0, 4.2), layout="constrained")
+    left, right = made.subplots(1, 2)
+    for mu, line, mark in zip(FRICTIONS, deviation, "osD^"):
+        seen = np.isfinite(line)
+        left.semilogy(np.array(AMPLITUDES)[seen], line[seen], f"{mark}-", ms=4, lw=1, label=f"mu = {mu:g}")
+        left.plot(
+            np.array(AMPLITUDES)[~seen],
+            np.full((~seen).sum(), 0.9),
+            "x",
+            color="k",
+            transform=left.get_xaxis_transform(),
+        )
+    left.axhline(1.0, color="0.5", lw=0.8)
+    left.set(
+        xlabel="largest shear / (mu P)", ylabel="standard deviation of mu / mu", title="x: mu is not in the data at all"
+    )
+    left.legend(frameon=False)
+    plots.fit(found, right)
+    return made
+
+
+TEXT = f"""Two equal cylinders (half-planes of E = {E:g} MPa, nu = 0.3, mu = {MU:g}, the radius of one is {RADIUS:g} mm, the other is flat) are pressed by
+{FORCE:g} N and pushed to and fro by {len(LOADS)} shear forces up to {max(LOADS):g} N. The shift of the upper one is measured, E of both bodies and mu are fitted from E = {START["E"]:g}, mu = {START["mu"]:g}.
+
+Without noise, data from the same grid of 40 points, and data from a finer grid, where what is left is the error of the coarse one:
+
+{{clean}}
+
+With normal noise of {NOISE:.0%} of the largest shift, {REPEATS} repetitions. The 95 % intervals should hold the truth about 95 times; a binomial
+count of 100 varies by 2.2:
+
+{{repetitions}}
+
+Where mu cannot be known: the standard deviation of mu that five states up to the shear T leave, from the Jacobian at the truth. The
+slip zone shrinks with T, and with it what the shift tells of mu. Where no point of the grid slips, mu does not enter at all, and `fit`
+says so (mu = {MU:g}; the figure has other values):
+
+{{knowledge}}
+
+The right half of the figure shows the residuals of the last repetition.
+"""
+
+
+if __name__ == "__main__":
+    counted, last = repetitions()
+    known, deviation = knowledge()
+    tables = {"clean": clean(), "repetitions": counted, "knowledge": known}
+    write(
+        "calibration",
+        "Calibration from a Cattaneo-Mindlin loop",
+        TEXT,
+        tables,
+        {"calibration": figure(deviation, last)},
+    )

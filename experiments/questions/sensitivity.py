@@ -1,0 +1,353 @@
+"""How exact are the derivatives of a certified solution, and what do they cost?"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+import contactopt
+from contactopt import InterfaceProblem, Solution, Status, natural_map_residual, scenes, solve
+from contactopt.analysis.solve_scene import Solved
+from contactopt.derivatives.outputs import seeds_of
+from contactopt.derivatives.parameters import parameters
+from contactopt.derivatives.states import chain_of
+from contactopt.interface.reduction import reduce_bodies
+from contactopt.problem import dimensionless
+from contactopt.problem.laws.coulomb import Coulomb
+from contactopt.solving.kernels.alart_curnier import coulomb_equations
+from experiments.report import write
+
+PROBLEMS = 100
+STEP = 1e-6
+SCENES: dict[str, tuple[Callable[[], Any], tuple[str, ...], tuple[str, ...], dict[str, Any]]] = {
+    "punch-2d": (
+        lambda: scenes.flat_punch(2, elements=16),
+        ("mu", "E:punch", "nu:foundation", "force:punch:y"),
+        ("approach", "energy", "pressure:3", "pressure", "shear_force"),
+        {},
+    ),
+    "punch-3d": (lambda: scenes.flat_punch(3, elements=6), ("mu", "E:punch", "nu:punch"), ("approach", "energy"), {}),
+    "sphere": (
+        lambda: scenes.make_scene("sphere", elements=8),
+        ("E", "nu", "force:sphere:z"),
+        ("approach", "width"),
+        {},
+    ),
+    "cattaneo-2d": (
+        lambda: scenes.make_scene("cattaneo-2d", elements=10),
+        ("E:upper", "nu:lower", "mu", "force:upper:x"),
+        ("shift", "energy", "width", "stick"),
+        {},
+    ),
+    "stack": (lambda: scenes.make_scene("stack"), ("E", "nu"), ("energy",), {}),
+    "punch-2d, products": (
+        lambda: scenes.flat_punch(2, elements=16),
+        ("mu", "E:punch"),
+        ("approach", "energy"),
+        {"Q": "implicit"},
+    ),
+}
+
+
+def random_problem(seed: int, dim: int) -> InterfaceProblem:
+    """Positive definite Q, every third one unsymmetric, every second pressed by a plate; 8 to 20 contacts."""
+    rng = np.random.default_rng(seed)
+    k = int(rng.integers(8, 21))
+    n, p = k * dim, seed % 2
+    A, B = rng.normal(size=(2, n, n))
+    Q = A @ A.T / n + 0.3 * np.eye(n) + (seed % 3 == 0) * 0.15 * (B - B.T) / np.sqrt(n)
+    V, s = np.zeros((n, p)), -0.8 * k * np.ones(p)
+    V[::dim] = 1.0
+    return InterfaceProblem(Q, 0.5 * rng.normal(size=(k, dim)), rng.uniform(0.1, 0.5, k), V, s)
+
+
+def directions(problem: InterfaceProblem, seed: int) -> dict[str, dict[str, np.ndarray]]:
+    """One direction for each kind of data."""
+    rng = np.random.default_rng(seed)
+    shapes = {"q": problem.q.shape, "mu": (problem.contacts,), "s": problem.s.shape, "V": problem.V.shape}
+    found = {name: {name: 0.2 * rng.normal(size=shape)} for name, shape in shapes.items() if np.prod(shape)}
+    return found | {"Q": {"Q": 0.1 * rng.normal(size=problem.Q.shape)}}
+
+
+def moved(problem: InterfaceProblem, change: dict[str, np.ndarray], t: float) -> InterfaceProblem:
+    data = {name: getattr(problem, name) + t * value for name, value in change.items() if name != "mu"}
+    return replace(problem, law=problem.law.shifted(t * change.get("mu", np.zeros(problem.contacts))), **data)
+
+
+def paired(dual: Any, change: dict[str, np.ndarray]) -> float:
+    return sum(float(np.sum(getattr(dual, name) * value)) for name, value in change.items())
+
+
+def against_differences(dim: int) -> list[dict[str, Any]]:
+    """The worst of PROBLEMS random problems for each kind of data."""
+    worst: dict[str, list[float]] = {name: [0.0, 0.0] for name in ("q", "mu", "s", "V", "Q")}
+    used = seed = left_out = 0
+    while used < PROBLEMS:
+        seed += 1
+        problem = random_problem(seed, dim)
+        solution = solve(problem, tol=1e-12)
+        if not solution.solved:
+            left_out += 1
+            continue
+        # A difference needs both of its ends in the piece of the solution.
+        ours = contactopt.sensitivity(problem, solution, distance=1e-4)
+        if not ours.differentiable:
+            left_out += 1
+            continue
+        used += 1
+        weight = np.random.default_rng(seed).normal(size=problem.q.shape)
+        dual = ours.adjoint(reactions=weight)
+        for name, change in directions(problem, seed).items():
+            ends = [
+                solve(moved(problem, change, t), "newton", tol=1e-14, start=solution, max_iterations=20)
+                for t in (STEP, -STEP)
+            ]
+            found = ours.forward(**change)
+            wanted = (ends[0].reactions - ends[1].reactions) / (2 * STEP)
+            error = float(np.abs(found.reactions - wanted).max() / np.abs(wanted).max())
+            one, two = float(np.sum(weight * found.reactions)), paired(dual, change)
+            size = float(np.linalg.norm(weight) * np.linalg.norm(found.reactions))
+            worst[name] = [max(worst[name][0], error), max(worst[name][1], abs(one - two) / size)]
+    return [
+        {
+            "dim": dim,
+            "problems": used,
+            "left out": left_out,
+            "data": name,
+            "difference": row[0],
+            "adjoint - forward": row[1],
+        }
+        for name, row in worst.items()
+    ]
+
+
+def at_kinks(seed: int, dim: int) -> tuple[InterfaceProblem, Solution]:
+    """Contact 0 grazes, 1 is between stick and slip, 2 is at the apex, 3 sticks, 4 slips, 5 is open."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(6 * dim, 6 * dim))
+    Q = A @ A.T / (6 * dim) + 0.5 * np.eye(6 * dim)
+    mu, e = rng.uniform(0.2, 0.4, 6), rng.normal(size=(6, dim - 1))
+    e /= np.linalg.norm(e, axis=1)[:, None]
+    r, u = np.zeros((2, 6, dim))
+    u[0, 1:], u[5, 1:], u[5, 0], u[4, 1:] = 0.7 * e[0], 0.3 * e[5], 1.0, 0.8 * e[4]
+    r[[1, 3, 4], 0] = 1.0, 1.5, 1.2
+    r[1, 1:], r[3, 1:], r[4, 1:] = mu[1] * e[1], 0.4 * mu[3] * e[3], -1.2 * mu[4] * e[4]
+    problem = InterfaceProblem(Q, u - (Q @ r.ravel()).reshape(r.shape), Coulomb(mu))
+    return problem, Solution(r, np.zeros(0), Status.SOLVED, natural_map_residual(problem, r, np.zeros(0)), 0, "exact")
+
+
+def one_sided() -> list[dict[str, Any]]:
+    rows = []
+    for dim in (2, 3):
+        worst, named = 0.0, 0
+        for seed in range(PROBLEMS // 2):
+            problem, solution = at_kinks(seed, dim)
+            ours = contactopt.sensitivity(problem, solution)
+            named += [weak.contact for weak in ours.weak] == [0, 1, 2]
+            rng, h = np.random.default_rng(seed + 1000), 1e-7
+            change = {"q": rng.normal(size=problem.q.shape), "mu": 0.3 * rng.normal(size=6)}
+            end = solve(moved(problem, change, h), tol=1e-13, start=solution)
+            wanted = (end.reactions - solution.reactions) / h
+            error = np.abs(ours.forward(**change).reactions - wanted).max() / np.abs(wanted).max()
+            worst = max(worst, float(error))
+        rows.append({"dim": dim, "problems": PROBLEMS // 2, "kinks named": named, "difference": worst})
+    return rows
+
+
+def solved(scene: Any, settings: dict[str, Any], start: Solution | None = None) -> Solved:
+    reduction = reduce_bodies(scene, **settings)
+    return Solved(reduction, solve(reduction.problem, tol=1e-13, start=start))
+
+
+def value(quantity: str, result: Solved) -> float:
+    return float(seeds_of(quantity, chain_of(result).steps[-1]).value)
+
+
+def through_scenes() -> list[dict[str, Any]]:
+    """The best of central differences with two steps, so that neither rounding nor curvature of the difference decides."""
+    rows = []
+    for name, (make, names, quantities, settings) in SCENES.items():
+        scene = make()
+        base = solved(scene, settings)
+        for quantity in quantities:
+            found = contactopt.gradient(base, quantity, names)
+            assert found.differentiable
+            for which in parameters(names, scene):
+                at, errors = which.read(scene), []
+                for relative in (1e-4, 1e-5):
+                    h = relative * (abs(at) or 1.0)
+                    ends = [solved(which.put(scene, at + t), settings, base.solution) for t in (h, -h)]
+                    wanted = (value(quantity, ends[0]) - value(quantity, ends[1])) / (2 * h)
+                    scale = max(abs(wanted), 1e-3 * abs(found.value / (at or 1.0)))
+                    errors.append(abs(found.by[which.name] - wanted) / scale)
+                once = abs(found.onesided({which.name: 1.0}) - found.by[which.name]) / scale
+                rows.append(
+                    {
+                        "scene": name,
+                        "quantity": quantity,
+                        "parameter": which.name,
+                        "derivative": float(found.by[which.name]),
+                        "difference": float(min(errors)),
+                        "adjoint - forward": float(once),
+                    }
+                )
+    return rows
+
+
+def cpu(act: Callable[[], Any], repeats: int = 5) -> float:
+    times = []
+    for _ in range(repeats):
+        begin = time.process_time()
+        act()
+        times.append(time.process_time() - begin)
+    return median(times)
+
+
+def single_step(problem: InterfaceProblem, solution: Solution) -> float:
+    """CPU seconds of one dense Newton step at the solution, with its own factorisation; nan where Q is no array."""
+    if not isinstance(problem.Q, np.ndarray):
+        return float("nan")
+    scaled, scales = dimensionless(problem)
+    equations = coulomb_equations(scaled)
+    point = scales.to_dimensionless(solution.reactions, solution.multipliers)
+    _, error, balance, D = equations.evaluate(*point)
+    return cpu(lambda: equations.step(error, balance, D), 3)
+
+
+def costs() -> list[dict[str, Any]]:
+    """CPU seconds of all derivatives of one quantity, and of one step of the solve that they come from."""
+    rows = []
+    cases = (
+        ("punch-2d, dense", lambda: scenes.flat_punch(2, elements=512), {"Q": "explicit"}),
+        ("punch-3d, dense", lambda: scenes.flat_punch(3, elements=16), {"Q": "explicit"}),
+        ("punch-3d, multigrid", lambda: scenes.flat_punch(3, elements=10), {"Q": "implicit", "solver": "multigrid"}),
+    )
+    for name, make, settings in cases:
+        reduction = reduce_bodies(make(), **settings)
+        problem = reduction.problem
+        solution = solve(problem, "newton", tol=1e-8)
+        steps = solution.iterations
+        whole = cpu(lambda p=problem: solve(p, "newton", tol=1e-8), 3)
+        weight = np.zeros(problem.q.shape)
+        weight[:, 0] = np.linspace(0.0, 1.0, problem.contacts)
+
+        def linear(p: InterfaceProblem = problem, s: Solution = solution, w: np.ndarray = weight) -> None:
+            contactopt.sensitivity(p, s).adjoint(reactions=w).mu  # noqa: B018
+
+        own = cpu(linear, 3)
+        rows.append(
+            {
+                "problem": name,
+                "contacts": problem.contacts,
+                "Newton steps": steps,
+                "whole solve [s]": whole,
+                "one step that factorises [s]": single_step(problem, solution),
+                "gradient by all data [s]": own,
+                "over the whole solve": own / whole,
+            }
+        )
+    return rows
+
+
+def twenty() -> list[dict[str, Any]]:
+    """Twenty parameters: the gap at places of the punch in twenty smooth shapes, and materials, by gradient or by differences."""
+    scene = scenes.flat_punch(2, elements=128)
+    base = solved(scene, {})
+    problem = base.reduction.problem
+    x = problem.chart.places[0] / np.abs(problem.chart.places).max()
+    shapes = np.cos(np.pi * np.arange(16) * x[:, None])
+    materials = ("E:punch", "E:foundation", "nu:punch", "nu:foundation")
+
+    def ours() -> Any:
+        found = contactopt.gradient(base, "energy", ("gap", *materials))
+        return np.append(shapes.T @ found.by["gap"], [found.by[name] for name in materials])
+
+    def one_sided_difference() -> np.ndarray:
+        """The cheapest difference: warm starts, and no new reduction for the gap."""
+        out, first = [], value("energy", base)
+        h = 1e-6
+        for shape in shapes.T:
+            q = problem.q.copy()
+            q[:, 0] += h * shape
+            there = replace(problem, q=q)
+            end = Solved(replace(base.reduction, problem=there), solve(there, tol=1e-12, start=base.solution))
+            out.append((value("energy", end) - first) / h)
+        for which in parameters(materials, scene):
+            at = which.read(scene)
+            out.append((value("energy", solved(which.put(scene, at * (1 + h)), {}, base.solution)) - first) / (h * at))
+        return np.array(out)
+
+    fast, slow = cpu(ours), cpu(one_sided_difference, 3)
+    error = np.abs(ours() - one_sided_difference()).max() / np.abs(ours()).max()
+    return [
+        {
+            "contacts": problem.contacts,
+            "parameters": shapes.shape[1] + len(materials),
+            "gradient [s]": fast,
+            "differences [s]": slow,
+            "times faster": slow / fast,
+            "they differ by": float(error),
+        }
+    ]
+
+
+TEXT = f"""`contactopt.sensitivity` and `contactopt.gradient` against central differences of solved problems. A relative error is the largest
+over all forces, over the largest derivative of a force.
+
+{{random}}
+
+{PROBLEMS} random problems in each dimension, with a positive definite Q (every third unsymmetric), every second with a plate. Left out are
+problems that were not solved to 1e-12, and those with a contact nearer than 1e-4 of the largest force to a kink, where the two ends
+of a difference may lie on different pieces.
+
+At kinks, where three contacts are weakly active by construction, one-sided differences with the step 1e-7:
+
+{{kinks}}
+
+Through the reduction of scenes, by parameters of people. Of two central differences, with the relative steps 1e-4 and 1e-5, the nearer one
+counts; derivatives far below the size of the quantity are compared with a thousandth of it. `shear_force`, `energy` and others in
+units of N and mm:
+
+{{scenes}}
+
+What it costs, in CPU seconds, medians on a shared machine, `OMP_NUM_THREADS=1`. The gradient by all data (q, mu, s, Q, V) of one function is one
+factorisation with one solve, or one coupled linear solve to the relative accuracy 1e-11, and the certificate of the solution. The whole
+solve shares one factorisation among its steps (dense), and solves its linear systems to one or two digits only (multigrid), so that
+the average step is much cheaper than a step that stands alone:
+
+{{costs}}
+
+One adjoint solve against one-sided differences with warm starts, for sixteen shapes of the gap and four constants of materials. A
+difference by the gap solves the interface problem again, one by a constant also reduces the bodies again:
+
+{{twenty}}
+"""
+
+
+if __name__ == "__main__":
+    parts: dict[str, Callable[[], list[dict[str, Any]]]] = {
+        "random": lambda: [row for dim in (2, 3) for row in against_differences(dim)],
+        "kinks": one_sided,
+        "scenes": through_scenes,
+        "costs": costs,
+        "twenty": twenty,
+    }
+    only = sys.argv[1:]
+    if only:
+        for part in only:
+            for row in parts[part]():
+                print(row)
+    else:
+        write(
+            "sensitivity",
+            "Derivatives of certified solutions",
+            TEXT,
+            {name: make() for name, make in parts.items()},
+            {},
+        )

@@ -1,0 +1,327 @@
+# %% [markdown]
+# # 9. The derivative of a solution, and its kinks
+#
+# How does the contact force change if friction grows a little, or if the load does? Whoever fits a friction coefficient to
+# measurements, or shapes a punch so that its pressure is even, needs the answer to this question. The solution of a
+# contact problem is a function of its data, and this function has a derivative almost everywhere. This tutorial draws the
+# function for one contact node, computes its derivative by hand and by `contactopt.sensitivity`, looks at the places
+# where there is none, and shows why it is a bad idea to smooth them away.
+#
+# Reading time: 15 minutes. [Tutorial 1](one_contact_node.py) explains the letters, and solves the problem of the one node.
+
+# %%
+from dataclasses import replace
+from importlib.util import find_spec
+
+import cvxpy as cp
+import matplotlib.pyplot as plt
+import numpy as np
+
+import contactopt
+from contactopt import HalfSpace, InterfaceProblem, Material, Rigid, Scene, sensitivity, solve
+
+# %% [markdown]
+# ## One node as a function of friction and load
+#
+# The node of tutorial 1 would sink 1 mm into the floor and move 0.9 mm to the right if there were no contact. The floor
+# answers with a normal force $r_n$ and a friction force $r_t$. We solve the problem for many friction coefficients $\mu$,
+# and then for many horizontal loads $q_t$, and each time we also ask for the slope.
+
+# %%
+Q = np.array([[1.0, 0.4], [0.4, 1.2]])  # mm / N
+q = np.array([-1.0, 0.9])  # mm
+
+
+def solved(mu, load=q):
+    problem = InterfaceProblem(Q, [load], mu)
+    return problem, solve(problem, tol=1e-12)
+
+
+fig, axes = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
+frictions = np.linspace(0.0, 1.3, 53)
+by_mu = np.array([solved(mu)[1].reactions[0] for mu in frictions])
+loads = np.linspace(-2.5, 2.5, 101)
+by_load = np.array([solved(0.5, [-1.0, load])[1].reactions[0] for load in loads])
+for ax, x, forces, label in (
+    (axes[0], frictions, by_mu, "friction coefficient $\\mu$"),
+    (axes[1], loads, by_load, "load $q_t$ [mm]"),
+):
+    ax.plot(x, forces[:, 0], "C1", label="$r_n$")
+    ax.plot(x, forces[:, 1], "C0", label="$r_t$")
+    ax.set(xlabel=label, ylabel="force [N]")
+axes[0].axvline(5 / 6, color="0.7", lw=0.8)
+axes[0].annotate("slips | sticks", (5 / 6, 0.2), ha="center")
+for mu in (0.3, 0.6, 1.1):
+    problem, solution = solved(mu)
+    slope = sensitivity(problem, solution).forward(mu=1.0).reactions[0]
+    step = np.array([-0.1, 0.1])
+    for component in range(2):
+        axes[0].plot(mu + step, solution.reactions[0, component] + step * slope[component], "k", lw=2.5)
+axes[0].plot([], [], "k", lw=2.5, label="slope from sensitivity")
+axes[0].legend(frameon=False)
+axes[1].legend(frameon=False)
+
+# %% [markdown]
+# The curves consist of smooth pieces. On the left, the node slips for small $\mu$; at $\mu = 5/6$ it begins to stick, and
+# from there on friction has no say any more. On the right there are three pieces: slip to the left, stick, and slip to the
+# right. Inside a piece the solution is a smooth function, and at the ends of a piece it has a **kink**: two slopes, one for
+# each side.
+#
+# ## The derivative by hand
+#
+# While the node slips to the right, $r_t = -\mu\, r_n$ and the gap is closed:
+#
+# $$ Q_{nn} r_n - \mu\, Q_{nt} r_n + q_n = 0 \quad\Rightarrow\quad r_n = \frac{-q_n}{Q_{nn} - \mu\, Q_{nt}},
+# \qquad \frac{dr_n}{d\mu} = \frac{Q_{nt}\, r_n}{Q_{nn} - \mu\, Q_{nt}} . $$
+#
+# For many contacts nobody wants to do this by hand. But the recipe is the same: **keep what every contact does, and
+# differentiate the equations that are left.** Newton's method has these equations at hand. Its last step solved a linear
+# system with the matrix
+
+# %% [markdown]
+# $$ M = \begin{pmatrix} I - D + D\rho Q & D \rho V \\ V^\top & 0 \end{pmatrix} $$
+#
+# in which $D$ says which contact is open ($D = 0$), sticks ($D = I$) or slips. The derivative along a direction is one
+# more solve with $M$. The gradient of one number by *all* data is one solve with $M^\top$: this is the adjoint.
+
+# %%
+mu = 0.5
+problem, solution = solved(mu)
+derivative = sensitivity(problem, solution)
+r_n = solution.reactions[0, 0]
+by_hand = Q[0, 1] * r_n / (Q[0, 0] - mu * Q[0, 1])
+
+forward = derivative.forward(mu=1.0).reactions[0]
+adjoint = derivative.adjoint(reactions=[[1.0, 0.0]])  # of the function r_n
+print(f"dr_n/dmu: by hand {by_hand:.6f}, forward {forward[0]:.6f}, adjoint {adjoint.mu[0]:.6f}")
+print(f"dr_n/dq = {adjoint.q[0]}, dr_n/dQ =\n{adjoint.Q}")
+
+assert np.isclose(forward[0], by_hand) and np.isclose(adjoint.mu[0], by_hand)
+assert np.isclose(forward[1], -r_n - mu * by_hand)  # the product rule for r_t = -mu r_n
+nudged = InterfaceProblem(np.add(Q, [[1e-6, 0.0], [0.0, 0.0]]), [q], mu)
+assert np.isclose((solve(nudged, tol=1e-13).reactions[0, 0] - r_n) / 1e-6, adjoint.Q[0, 0], rtol=1e-4)
+
+# %% [markdown]
+# ## At a kink
+#
+# At $\mu = 5/6$ the friction force is at its bound although the node does not move. Such a contact is called *weakly
+# active*. Here the solution has no derivative, but it has one on each side. `sensitivity` names the contact, and `forward`
+# gives the slope of the side to which the direction points. To find it, it solves a small complementarity problem: does the
+# contact stick or slip if we move this way?
+
+# %%
+problem, solution = solved(5 / 6)
+kink = sensitivity(problem, solution)
+print(kink.sentence)
+more, less = kink.forward(mu=1.0).reactions[0], kink.forward(mu=-1.0).reactions[0]
+print(f"for more friction dr = {more}, for less friction dr = {less}")
+
+assert not kink.differentiable and kink.weak[0].edge == "stick / slip"
+assert np.allclose(more, 0.0)  # it sticks: friction has no say
+assert less[0] < -0.5 and less[1] > 0.5
+assert not np.allclose(more, -less)  # a derivative would be linear in the direction
+
+# %% [markdown]
+# ## Bilevel programs, in words
+#
+# Suppose a sensor says that the node slips by 0.1 mm. Which $\mu$ is it? This is an optimisation problem (make the
+# difference between slip and sensor small) whose constraint is again an optimisation problem, or at least a complementarity
+# problem (the slip is that of a solution). The outer problem is the *leader*, who chooses $\mu$; the contact is the
+# *follower*, who answers by a solution.
+#
+# - If the follower minimises something, as contact without friction does, the whole is a **bilevel program**.
+# - If the follower's conditions are written out as constraints of the leader, $u_n \ge 0$, $r_n \ge 0$, $u_n r_n = 0$
+#   and so on, the whole is a **mathematical program with equilibrium constraints**, an MPEC. It is awkward for solvers of
+#   nonlinear programs: where $u_n = r_n = 0$ the gradients of these constraints are not independent, and multipliers
+#   need not exist.
+# - A third way is the one we take: let a contact solver answer for the follower, with a certificate, and use the
+#   derivative of its answer. This is *implicit programming*. The leader sees a function with kinks.
+#
+# Newton's method finds the $\mu$ of the sensor in a few steps, from the derivative of the solution:
+
+# %%
+sensor, mu = 0.1, 0.7
+for _ in range(6):
+    problem, solution = solved(mu)
+    change = sensitivity(problem, solution).forward(mu=1.0)
+    slip = problem.displacements(solution.reactions, solution.multipliers)[0, 1]
+    mu -= (slip - sensor) / change.displacements[0, 1]
+print(f"mu = {mu:.9f}, slip = {slip:.9f} mm, certificate {solution.residual:.1e}")
+
+assert np.isclose(slip, sensor, rtol=1e-9)
+
+# %% [markdown]
+# From a first guess $\mu > 5/6$ this does not work: the node sticks, the derivative of the slip is zero, and no step is
+# better than another. That is no fault of the method. *Data from a contact that sticks say nothing of friction*, but that
+# $\mu$ is large enough. `contactopt.fit` finds this out by the singular values of its Jacobian, and says so.
+
+# %%
+problem, solution = solved(1.0)
+assert sensitivity(problem, solution).forward(mu=1.0).displacements[0, 1] == 0.0
+
+# %% [markdown]
+# ## Why not smooth the kinks away?
+#
+# Many codes replace the kinks by round corners: $\max(y, 0)$ becomes $(y + \sqrt{y^2 + \varepsilon^2}) / 2$, and stick becomes
+# creep, with a friction force $-\mu\, r_n\, u_t / \sqrt{u_t^2 + \varepsilon^2}$. Then everything has a derivative. But it is the
+# derivative of another problem. We solve the round problem for a node that *sticks*, $\mu = 1$, and ask how much its slip
+# depends on friction. The right answer is: not at all.
+
+
+# %%
+def rounded(mu, eps):
+    """Newton's method on u_n = 0 and r_t = -mu r_n u_t / sqrt(u_t^2 + eps^2); eps goes down step by step."""
+    r = np.array([1.5, -1.25])
+    for size in np.geomspace(1.0, eps, 25):
+        for _ in range(40):
+            u = Q @ r + q
+            root = np.sqrt(u[1] ** 2 + size**2)
+            F = np.array([u[0], r[1] + mu * r[0] * u[1] / root])
+            slope = mu * r[0] * size**2 / root**3
+            r = r - np.linalg.solve([Q[0], [mu * u[1] / root + slope * Q[1, 0], 1.0 + slope * Q[1, 1]]], F)
+    return r
+
+
+widths = np.array([1e-1, 3e-2, 1e-2, 3e-3, 1e-3])
+slips = np.array([(Q @ rounded(1.0, eps) + q)[1] for eps in widths])
+slopes = np.array([(Q @ (rounded(1.01, eps) - rounded(0.99, eps)))[1] / 0.02 for eps in widths])
+certificates = [
+    contactopt.natural_map_residual(InterfaceProblem(Q, [q], 1.0), rounded(1.0, eps)[None]) for eps in widths
+]
+
+fig, ax = plt.subplots(figsize=(6, 3.8), layout="constrained")
+ax.loglog(widths, slips, "o-", label="slip of a node that sticks [mm]")
+ax.loglog(widths, -slopes, "s-", label="its derivative by $\\mu$, with the opposite sign [mm]")
+ax.loglog(widths, certificates, "^-", label="certificate of the forces")
+ax.set(xlabel="width of the round corner [mm]", ylabel="what should be zero")
+ax.legend(frameon=False)
+
+assert np.all(slips > 0) and np.all(slopes < 0)
+assert min(certificates) > 1e-4  # no corner makes it a solution
+
+# %% [markdown]
+# Every rounded answer creeps, and says that more friction would help. A smaller $\varepsilon$ makes the error smaller and
+# Newton's method harder, for the round corner becomes a sharp one. The certificate tells the two apart: a solution of
+# Coulomb's law passes it, and a solution of a smooth law does not. What is kept with it is the knowledge of *which*
+# contacts are at a kink, and what happens on each side.
+#
+# ## The convex case: derivatives of cone programs
+#
+# Contact without friction, and with associated friction, is a convex program. `diffcp` differentiates solutions of convex
+# cone programs, and `cvxpy` and `cvxpylayers` build on it. The programs must be convex, so Coulomb's law is not among
+# them. Where both apply they must agree. This cell is skipped if `diffcp` is not installed.
+
+# %%
+rng = np.random.default_rng(2)
+A = rng.normal(size=(8, 8))
+many = InterfaceProblem(A @ A.T / 8 + 0.3 * np.eye(8), 0.5 * rng.normal(size=(4, 2)) - [0.8, 0.0], 0.0)
+answer = solve(many, tol=1e-12)
+direction = rng.normal(size=4)
+ours = sensitivity(many, answer).forward(q=np.stack([direction, 0 * direction], axis=1)).reactions[:, 0]
+print(f"contacts that touch: {int((answer.reactions[:, 0] > 0).sum())} of 4; ours: {np.round(ours, 6)}")
+
+if find_spec("diffcp"):
+    force, load = cp.Variable(4), cp.Parameter(4)
+    load.value = many.q[:, 0]
+    normal = cp.Problem(
+        cp.Minimize(cp.sum_squares(np.linalg.cholesky(many.Q[::2, ::2]).T @ force) / 2 + load @ force), [force >= 0]
+    )
+    normal.solve(requires_grad=True, eps=1e-10)
+    load.delta = direction
+    normal.derivative()
+    print(f"diffcp: {np.round(force.delta, 6)}")
+    assert np.allclose(force.delta, ours, atol=1e-5)
+
+t = 1e-6
+there = replace(many, q=many.q + t * np.stack([direction, 0 * direction], axis=1))
+assert np.allclose((solve(there, tol=1e-13).reactions[:, 0] - answer.reactions[:, 0]) / t, ours, atol=1e-5)
+
+# %% [markdown]
+# ## Design: a punch with an even pressure
+#
+# A flat punch presses hardest at its corners. Which profile makes the pressure even? `contactopt.design` minimises the
+# largest pressure. In each step it solves a *linear* program, made of the derivatives of all pressures by all shapes, inside
+# a trust region, and it keeps a step only if the largest pressure of the *certified* solution has really become smaller.
+# The maximum is a kink as well, and as constraints of a linear program it does no harm.
+
+# %%
+half, cells = 10.0, 40
+points = half * (2 * np.arange(cells) + 1 - cells) / cells
+flat = HalfSpace("half-plane", Material(5.0, 0.3), points)
+punch = Scene("punch", Rigid("punch", normal=(0, 1), force={"y": -100.0}), flat, 0.3)
+
+
+def shapes(places):
+    return np.stack([(places[0] / half) ** power for power in (2, 4, 6, 8)], axis=1)
+
+
+designed = contactopt.design(punch, shapes)
+print(
+    f"largest pressure: {[round(visit.peak, 2) for visit in designed.visits]} MPa; over the mean {designed.unevenness:.3f}"
+)
+
+fig, ax = plt.subplots(figsize=(6, 3.8), layout="constrained")
+ax.plot(points, designed.gap - designed.gap.min(), label="designed profile [mm]")
+ax.plot(points, designed.pressure, label="its pressure [MPa]")
+ax.set(xlabel="place [mm]", ylabel="profile, pressure")
+ax.legend(frameon=False)
+
+assert designed.unevenness < 1.05 and designed.visits[0].peak > 3 * designed.peak
+assert all(visit.certificate < 1e-9 for visit in designed.visits)
+
+# %% [markdown]
+# ## Exercises
+#
+# **1.** The vertical load: at $q_n = 0$ and $q_t = 0.5$ mm the node just touches the floor. Which edge does `sensitivity`
+# name, and what are the two one-sided derivatives by $q_n$?
+#
+# <details><summary>Solution</summary>
+#
+# It is the edge between open and closed. Lifted, the node has no force. Pressed, it slips to the right, and the formula by
+# hand holds with $q_n$ in place of its value.
+#
+# ```python
+# touching = InterfaceProblem(Q, [[0.0, 0.5]], 0.5)
+# grazing = sensitivity(touching, solve(touching))
+# assert [weak.edge for weak in grazing.weak] == ["open / closed"]
+# assert np.allclose(grazing.forward(q=np.array([[1.0, 0.0]])).reactions, 0.0)
+# pressed = grazing.forward(q=np.array([[-1.0, 0.0]])).reactions[0]
+# assert np.allclose(pressed, np.array([1.0, -0.5]) / (Q[0, 0] - 0.5 * Q[0, 1]))
+# ```
+#
+# </details>
+#
+# **2.** At the apex, $q = (0, 0)$, the node neither presses nor slips. Show that the one-sided derivative by $q$ is
+# not linear: the derivative along the sum of two directions is not the sum of the derivatives.
+#
+# <details><summary>Solution</summary>
+#
+# Close to the apex the problem looks the same in all scales, so the one-sided derivative along $d$ is the solution of the
+# problem with $q = d$ itself: a contact problem, not a linear map.
+#
+# ```python
+# nothing = InterfaceProblem(Q, [[0.0, 0.0]], 0.5)
+# apex = sensitivity(nothing, solve(nothing))
+# one, two = np.array([[-1.0, 0.9]]), np.array([[-1.0, -2.0]])
+# along = [apex.forward(q=d).reactions for d in (one, two, one + two)]
+# assert not np.allclose(along[0] + along[1], along[2])
+# for d, found in zip((one, two, one + two), along):
+#     assert np.allclose(found, solve(InterfaceProblem(Q, d, 0.5)).reactions)
+# ```
+#
+# </details>
+#
+# **3.** Fix two coefficients of the profile by a convex constraint: the profile must have the height zero at the rim, and the
+# largest pressure can only become larger.
+#
+# <details><summary>Solution</summary>
+#
+# The coefficients of even powers add up to the height at the rim, so the constraint is that their sum is zero.
+#
+# ```python
+# tied = contactopt.design(punch, shapes, constraints=lambda c: [cp.sum(c) == 0])
+# assert abs(tied.profile.sum()) < 1e-6 * np.abs(tied.profile).max()
+# assert tied.peak >= designed.peak * (1 - 1e-3)
+# ```
+#
+# </details>
