@@ -163,7 +163,7 @@ def run(
     elements : across the contact half-width
     accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
         sentence in `Result.estimate` says why not; `elements` only scales the first mesh
-    quantity : a name in contactopt.analysis.quantities.QUANTITIES
+    quantity : a name in contactopt.analysis.quantities.QUANTITIES; of one of several pairs of surfaces 'NAME:PAIR'
     adaptive : whether meshes are refined only where the quantity needs it (contactopt.adaptivity), each body by itself, and not
         everywhere; quadrilaterals become triangles. More quantities can be bounded then, see contactopt.derivatives.outputs
         All arguments from `method` to here may stand in a scene file; those given here win.

@@ -15,6 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.protocol import Surface
+from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.problem.operators import Product
 from contactopt.scenes.scene import Rigid, Scene
@@ -90,7 +91,7 @@ class RigidBody:
         if self.part.gap is None:
             return np.zeros(other.points.shape[1])
         given = self.part.gap(other.places) if callable(self.part.gap) else self.part.gap
-        gap = np.asarray(given, dtype=float).ravel()
+        gap = real_array(f"the gap of rigid body '{self.name}'", given).ravel()
         if gap.shape != other.places.shape[1:] or not np.all(np.isfinite(gap)):
             raise InputError(f"the gap of rigid body '{self.name}' must give one finite number per contact node.")
         return np.asarray(other.weights @ gap)

@@ -19,6 +19,7 @@ import time
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -173,10 +174,22 @@ def _check_same(one: Scene, other: Scene) -> None:
 
 
 def _same_mesh(one: Any, other: Any) -> bool:
-    """Whether two given meshes have the same nodes and elements; meshes that functions make are not compared."""
+    """Whether two meshes have the same nodes and elements; functions that make them are compared by what they enclose."""
     if callable(one) or callable(other):
-        return callable(one) and callable(other)
+        return callable(one) and callable(other) and not _differ(one, other)
     return one is other or (np.array_equal(one.p, other.p) and np.array_equal(one.t, other.t))
+
+
+def _differ(one: Any, other: Any) -> bool:
+    """Whether two values are known to be different: numbers, texts, arrays, and functions of one code that enclose such."""
+    if isinstance(one, (int, float, str, np.ndarray)) and isinstance(other, (int, float, str, np.ndarray)):
+        return not np.array_equal(one, other)
+    if isinstance(one, (tuple, list)) and isinstance(other, (tuple, list)):
+        return len(one) != len(other) or any(map(_differ, one, other))
+    if isinstance(one, FunctionType) and isinstance(other, FunctionType) and one.__code__ is other.__code__:
+        enclosed = [[cell.cell_contents for cell in f.__closure__ or ()] for f in (one, other)]
+        return _differ(enclosed[0], enclosed[1])
+    return False
 
 
 def reduce(

@@ -325,3 +325,6 @@ assert all(visit.certificate < 1e-9 for visit in designed.visits)
 # ```
 #
 # </details>
+
+# %% tags=["remove-cell"]
+plt.show()  # opens the figures where this runs as a script
