@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -113,7 +114,7 @@ class RigidBody:
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
         return np.zeros(T.shape[0], dtype=bool)
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> np.ndarray:
         return np.asarray(self.at_rest + self.motions @ multipliers + np.roll(force, len(self.components)))
 
     def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
