@@ -8,6 +8,10 @@ INTERRUPTED = 130
 
 def main() -> int:
     """The command line; Ctrl-C while it is still being loaded ends with one line, too."""
+    if any(os.environ.get(name, "1") != "1" for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")):
+        # Ranks share the cores: one BLAS thread each, set before NumPy is loaded.
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+            os.environ.setdefault(name, "1")
     try:
         from contactopt.cli import main
 

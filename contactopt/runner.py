@@ -17,6 +17,7 @@ from contactopt.analysis.paths import PathResult, solve_states
 from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
 from contactopt.analysis.resultants import tables
 from contactopt.analysis.solve_scene import Options, Solved
+from contactopt.bodies.ranks import Team, spread
 from contactopt.cards import card, count, line
 from contactopt.errors import InputError
 from contactopt.figures.output import PAGE, draw, earlier_files, squeeze, write
@@ -27,7 +28,7 @@ from contactopt.interface.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.scenes import PATHS, make_path, make_scene
-from contactopt.scenes.scene import Scene
+from contactopt.scenes.scene import Part, Scene
 from contactopt.solving.methods import default_method, find_method
 
 if TYPE_CHECKING:
@@ -144,6 +145,7 @@ def run(
     figures: Sequence[str] = ("png",),
     html: bool = False,
     note: Note = lambda text: None,
+    team: Team | None = None,
     **changes: Any,
 ) -> Result:
     """Solve a scene end to end, and write its figures and files into a folder if one is given.
@@ -161,7 +163,7 @@ def run(
     elements : across the contact half-width
     accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
         sentence in `Result.estimate` says why not; `elements` only scales the first mesh
-    quantity : a name in contactopt.analysis.quantities.QUANTITIES
+    quantity : a name in contactopt.analysis.quantities.QUANTITIES; of one of several pairs of surfaces 'NAME:PAIR'
     adaptive : whether meshes are refined only where the quantity needs it (contactopt.adaptivity), each body by itself, and not
         everywhere; quadrilaterals become triangles. More quantities can be bounded then, see contactopt.derivatives.outputs
         All arguments from `method` to here may stand in a scene file; those given here win.
@@ -169,6 +171,7 @@ def run(
         of a small scene
     html : whether to write view.html too, the result as a page to explore (needs `pip install 'contactopt[view]'`)
     note : receives progress messages
+    team : ranks among which the bodies are dealt out (contactopt.bodies.ranks); None: all bodies live in this process
     changes : to the arguments of a named scene, or to the fields of a Scene
 
     Returns
@@ -197,6 +200,11 @@ def run(
     backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
     form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
     options = Options(form, choose("solver", solver, "auto"), chosen, choose("tol", tol, 1e-8), note=note)
+    if team is not None:
+        idle = team.size - sum(isinstance(part, Part) for part in states[-1].parts)
+        if idle > 0:
+            note(f"{idle} of {team.size} ranks have nothing to do: there are no more elastic bodies")
+        states = tuple(spread(state, team) for state in states)
     try:
         return _finish(states, out, files, method, backends, options, aim, start)
     except InputError as error:

@@ -10,6 +10,7 @@ import numpy as np
 import skfem
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce_bodies
+from contactopt.bodies.elements import face_nodes
 from contactopt.interface.coupling import COUPLINGS, Coupling
 from contactopt.interface.faces import faces_of
 from contactopt.interface.mortar import Mortar, mortar
@@ -59,7 +60,8 @@ def couple(scene: Any, own: str | None = None, elements: int | None = None, zone
     parts, sides = (scene.upper, scene.lower), []
     for b, p in zip((r.body for r in reduction.bodies), parts):
         facets = b.basis.mesh.boundaries[p.contact]
-        sides.append(faces_of(b.name, b.basis, b.degree, facets, b.weight, b.locations, p.curve))
+        faces = face_nodes(b.basis, b.degree, facets)
+        sides.append(faces_of(b.name, b.basis.mesh.refdom.__name__, b.degree, *faces, b.weight, b.locations, p.curve))
     return Coupled(reduction, mortar(*sides, own))
 
 

@@ -222,3 +222,17 @@ def test_a_body_far_from_the_origin_floats_as_well():
     floor = Rigid("floor", normal=(0, 1), gap=lambda x: x[1] - 1e4)
     a, b = (solve(reduce_bodies(scene).problem, tol=1e-9) for scene in (near, alone(moved, floor)))
     assert np.allclose(a.reactions, b.reactions, atol=1e-6)
+
+
+@pytest.mark.parametrize("side,holds", [(0.08, True), (0.09, False), (0.6, False)])
+def test_a_tall_tower_of_many_bodies_stands_up_to_its_limit(side, holds):
+    """Twelve blocks, 36 motions: it topples at a side force of width / height = 1 / 12 of its weight, and slides at mu."""
+    scene = stack(12, side=side, cells=(1,), mu=0.5)
+    if holds:
+        problem = reduce_bodies(scene).problem
+        solution = solve(problem)
+        assert solution.solved and escape(problem) is None
+        assert solution.reactions[:2, 0].sum() == pytest.approx(12.0, rel=1e-9)
+    else:
+        with pytest.raises(InputError, match="more than the contacts can hold"):
+            solve(reduce_bodies(scene).problem)

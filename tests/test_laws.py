@@ -26,6 +26,7 @@ from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.laws.frictionless import Frictionless
 from contactopt.problem.laws.mixed import Mixed, join
+from contactopt.problem.laws.tied import Tied
 from contactopt.problem.laws.tresca import Tresca
 from contactopt.solving.methods import METHODS, find_method, solvers_of, solves
 
@@ -35,6 +36,7 @@ ALL = {
     "tresca": Tresca(0.3),
     "associated": Associated(0.4),
     "frictionless": Frictionless(),
+    "tied": Tied(),
 }
 
 
@@ -50,6 +52,8 @@ def violation(name: str, parameter: float, r: np.ndarray, u: np.ndarray) -> floa
     """The largest violation of a law at one contact, from its conditions and not from the library's projections."""
     r_n, r_t, u_n, u_t = r[0], r[1:], u[0], u[1:]
     slip, force = np.linalg.norm(u_t), np.linalg.norm(r_t)
+    if name == "tied":
+        return float(np.linalg.norm(u))
     if name == "associated":
         return max(force - parameter * r_n, parameter * slip - u_n, abs(r @ u))
     normal = abs(u_n) if name == "bilateral" else max(-u_n, -r_n, min(abs(u_n), abs(r_n)))
@@ -63,7 +67,7 @@ def worst(problem: InterfaceProblem, solution, names: list[str], parameters: lis
     return max(violation(n, p, *pair) for n, p, *pair in zip(names, parameters, solution.reactions, u))
 
 
-PARAMETER = {"coulomb": 0.4, "bilateral": 0.4, "tresca": 0.3, "associated": 0.4, "frictionless": 0.0}
+PARAMETER = {"coulomb": 0.4, "bilateral": 0.4, "tresca": 0.3, "associated": 0.4, "frictionless": 0.0, "tied": 0.0}
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -440,7 +440,9 @@ def test_a_quarter_of_a_press_fit_is_half_of_a_half(degree, carrier):
         results.append(solution.reactions[order] / problem.areas[order, None])
         assert solution.reactions[order[0], 0] > 0 and solution.reactions[order[0], 1] == 0
     quarter, half = results
-    close = {1: 0.02, 2: 1e-9}[degree]  # kinks of linear elements are rounded off by the nodes that are modelled
+    close = {1: 0.05, 2: 1e-9}[
+        degree
+    ]  # at an end the kinks of linear elements are rounded off by the nodes on one side
     assert np.allclose(quarter, half, atol=close * np.abs(half).max())
 
 

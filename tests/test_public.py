@@ -90,11 +90,19 @@ def test_it_is_fully_annotated(name):
 
 
 def table_functions() -> dict[str, Any]:
-    """The exported functions, and those of the tables of plug-ins."""
+    """The exported functions, those of the tables of plug-ins, the named scenes, exact solutions and programs."""
     found = {name: getattr(contactopt, name) for name in contactopt.__all__}
     found |= {"make_scene": contactopt.scenes.make_scene, "make_path": contactopt.scenes.make_path}
     for table in (PRECONDITIONERS, COUPLINGS):
         found |= {name: getattr(importlib.import_module(row[0]), row[1]) for name, row in table.items()}
+    scenes = contactopt.scenes
+    rows = [*scenes.SCENES.values(), *scenes.PATHS.values()]
+    found |= {row[1]: getattr(importlib.import_module(f"contactopt.scenes.{row[0]}"), row[1]) for row in rows}
+    found |= {f"analytic.{name}": getattr(contactopt.analytic, name) for name in contactopt.analytic.__all__}
+    models = {
+        name: thing for name, thing in vars(contactopt.models).items() if inspect.isfunction(thing) and name[0] != "_"
+    }
+    found |= {f"models.{name}": thing for name, thing in models.items() if thing.__module__ == "contactopt.models"}
     return {name: thing for name, thing in found.items() if inspect.isfunction(thing)}
 
 

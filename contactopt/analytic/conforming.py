@@ -27,6 +27,16 @@ def pin_in_hole(force_per_length: float, radius: float, clearance: float, modulu
     clearance : c, the difference of their radii [length], small beside R
     modulus : E* of the pair [stress], from contact_modulus()
 
+    Returns
+    -------
+    Reference : pressure over the place, half-width along the arc and peak
+
+    Raises
+    ------
+    InputError : if an argument is not positive
+
+    Notes
+    -----
     Source: Persson (1964), On the stress distribution of cylindrical elastic bodies in contact (Chalmers); Ciavarella, Decuzzi
     (2001), The state of stress induced by the plane frictionless cylindrical contact. I. The case of elastic similarity, Int. J.
     Solids Struct. 38, 4507-4523.
@@ -70,6 +80,16 @@ def press_fit(
     bore, radius, outside : a of the shaft (0: solid), R of the interface, c of the hub [length]
     shaft, hub : the materials
 
+    Returns
+    -------
+    Reference : uniform pressure, half of the length of the circle and peak
+
+    Raises
+    ------
+    InputError : if the radii do not grow from bore to radius to outside
+
+    Notes
+    -----
     Source: Timoshenko, Goodier (1970), Theory of Elasticity, section 28.
     """
     check_positive(interference=interference, radius=radius, outside=outside)

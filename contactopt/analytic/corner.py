@@ -100,9 +100,27 @@ def corner(
 def edge_stick_threshold(
     upper: Material | None, lower: Material | None, angles: tuple[float, float] = (np.pi / 2, np.pi)
 ) -> float:
-    """Friction coefficient above which the edge sticks under monotone load [-]: |q/p| of the bonded field.
+    """Friction coefficient above which the edge of a body sticks under growing load.
 
-    inf where the bonded field oscillates: the edge then slips for every mu. nan where it is bounded.
+    This is the ratio |q / p| of the tractions of the bonded field.
+
+    Parameters
+    ----------
+    upper, lower
+        Materials; None is a rigid body.
+    angles
+        Of the upper and of the lower body at the corner [rad], up to 2 pi.
+
+    Returns
+    -------
+    float
+        [-]; inf where the bonded field oscillates, because the edge slips for every mu then, and nan where it is
+        bounded.
+
+    Raises
+    ------
+    InputError
+        For two rigid bodies, or angles out of range.
     """
     bonded = corner(upper, lower, None, angles)
     return float("inf") if bonded.oscillation else abs(bonded.ratio)

@@ -109,11 +109,30 @@ def unit_punch(mu: float, beta: float, axisymmetric: bool) -> UnitPunch:
 
 
 def stick_ratio(mu: float, beta: float, axisymmetric: bool = False) -> float:
-    """c/a [-] under monotone normal load: rigid flat punch, or round bodies with quadratic gaps.
+    """Half-width of the stick zone over that of contact, c / a, under growing normal load.
 
-    mu    friction coefficient, >= 0
-    beta  Dundurs' constant, |beta| < 1 (its sign only turns the shear traction); zero: no slip, c/a = 1
-    Accurate to 1e-6. Values below 1e-9 are returned as zero. Raises InputError for values out of range.
+    It is the same for a rigid flat punch and for round bodies with quadratic gaps. It is right to 1e-6; values below
+    1e-9 are returned as zero.
+
+    Parameters
+    ----------
+    mu
+        Friction coefficient, at least 0 [-].
+    beta
+        Dundurs' constant, of size below one [-]. Its sign only turns the shear traction. Zero means no slip, c / a =
+        1.
+    axisymmetric
+        Whether the punch is a disc rather than a strip.
+
+    Returns
+    -------
+    float
+        c / a [-].
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range.
     """
     check_number("the friction coefficient mu", mu, low=0.0, closed=True)
     check_beta(beta)

@@ -61,6 +61,11 @@ OWN_KEYS = ("kind", "caption", "where", "optional")  # of a figure; all others a
 LEFT_OUT = ("key", "label", "base_mb", "history")  # of a report's table
 PAGE = "benchmarks.html"
 DPI, SHADES = 90, 256
+QUESTIONS = (
+    "Which chart answers which question? Speed against accuracy shows what a certified residual costs. A performance profile shows where methods "
+    "fail, at its right end, and which is fast, at its left. A table of times by start shows what warm starts buy. A map shows for which numbers a "
+    "method fails, and time against size how its cost grows."
+)
 # Whatever an experiment's texts hold, a browser loads nothing from elsewhere and runs no script.
 POLICY = (
     '<meta http-equiv="Content-Security-Policy" '
@@ -290,7 +295,7 @@ def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
     ]
     head = f'<!doctype html><html lang="en"><meta charset="utf-8">{POLICY}<title>contactopt: benchmarks</title>'
     head += f"<style>{STYLE}</style>"
-    return f"{head}<h1>Benchmarks</h1><ul>{links}</ul>{''.join(sections)}</html>\n"
+    return f"{head}<h1>Benchmarks</h1><p>{QUESTIONS}</p><ul>{links}</ul>{''.join(sections)}</html>\n"
 
 
 def rendered(text: str, folder: Path) -> str:

@@ -9,12 +9,14 @@ from importlib import import_module
 from typing import Any
 
 from contactopt.bodies.protocol import AssembledBody
+from contactopt.bodies.ranks import RemotePart
 from contactopt.errors import InputError
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 
 # class of the part of a scene -> (module, function (scene, part, elements, zone) -> AssembledBody, what it is)
 BODIES: dict[type, tuple[str, str, str]] = {
     Part: ("contactopt.bodies.elastic", "assemble_elastic", "finite elements with linear elasticity"),
+    RemotePart: ("contactopt.bodies.remote", "assemble_remote", "finite elements on another rank"),
     Rigid: ("contactopt.bodies.rigid", "assemble_rigid", "a rigid body"),
     HalfSpace: (
         "contactopt.bodies.half_space",

@@ -20,11 +20,13 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.body import Assembly, build_body, reload_body
+from contactopt.bodies.elements import face_nodes
 from contactopt.bodies.fields import Fields, fields_of, recovery_error
 from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
 from contactopt.bodies.solvers import make_solver, solver_type
@@ -145,8 +147,13 @@ class ElasticBody:
         size = np.asarray(abs(T[:, self.interface]).sum(axis=1)).ravel() + np.abs(self._low_rank(T)[1]).sum(axis=1)
         return np.asarray(size > 0)
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> np.ndarray:
         """U of all unknowns, eq (13) of the paper."""
+        if free is not None and self.equilibrium is not None:
+            left, right = self.equilibrium.low_rank
+            U = self.at_rest + self.motions @ multipliers + left @ (right.T @ force)
+            U[self.equilibrium.free] += free
+            return np.asarray(U)
         U = self.at_rest + self.elastic_modes @ (self.elastic_modes.T @ force) + self.motions @ multipliers
         return np.asarray(U + self.relieved(force))
 
@@ -253,7 +260,8 @@ class AssembledElastic:
             places = np.asarray(curve(places), dtype=float)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False
-        facets = np.asarray(body.basis.mesh.boundaries[name])
+        kind, facets = body.basis.mesh.refdom.__name__, np.asarray(body.basis.mesh.boundaries[name])
+        faces, outward = face_nodes(body.basis, body.degree, facets)
         return Surface(
             body.name,
             body.locations[:, trace.nodes],
@@ -264,7 +272,7 @@ class AssembledElastic:
             tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
             held[unknowns[:, trace.nodes]],
             trace.cells,
-            Mesh(body.basis, body.degree, facets, body.weight, body.locations, unknowns, held, curve),
+            Mesh(kind, body.degree, faces, outward, body.weight, body.locations, unknowns, held, curve),
         )
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:

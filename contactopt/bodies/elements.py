@@ -29,6 +29,8 @@ import skfem
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine, RefQuad, RefTri
 
+from contactopt.errors import InputError
+
 SHAPES = {
     "RefTri": (skfem.MeshTri, {1: skfem.ElementTriP1, 2: skfem.ElementTriP2}),
     "RefQuad": (skfem.MeshQuad, {1: skfem.ElementQuad1, 2: skfem.ElementQuad2}),
@@ -97,8 +99,22 @@ class LeanBasis(skfem.CellBasis):
     def __init__(self, mesh: skfem.Mesh, element: skfem.Element, order: int):
         super(skfem.CellBasis, self).__init__(mesh, element, intorder=order, refdom=mesh.refdom)
         self.tind, self.nelems = None, mesh.nelements
-        self.dx = np.abs(self.mapping.detDF(self.X)) * np.broadcast_to(self.W, (self.nelems, len(self.W)))
+        self.dx = self._volumes() * np.broadcast_to(self.W, (self.nelems, len(self.W)))
         self.basis = _Shapes(element, self.mapping, self.X, self.Nbfun)
+
+    def _volumes(self) -> np.ndarray:
+        """Volume per reference volume, elements by quadrature points; InputError for an element that is flat or folds over."""
+        bad = np.zeros(self.nelems, dtype=bool)
+        with np.errstate(all="ignore"):
+            try:
+                ratio = np.broadcast_to(self.mapping.detDF(self.X), (self.nelems, len(self.W)))
+                bad = ~((ratio.min(axis=1) > 0) | (ratio.max(axis=1) < 0))
+            except Exception as error:  # scikit-fem has no name for it
+                raise InputError(f"the mesh has an element without volume, or one that folds over: {error}.") from error
+        if np.any(bad):
+            place = ", ".join(f"{x:g}" for x in self.mesh.p[:, self.mesh.t[:, np.argmax(bad)]].mean(axis=1))
+            raise InputError(f"the mesh has an element without volume, or one that folds over, at ({place}).")
+        return np.asarray(np.abs(ratio))
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -191,7 +192,7 @@ class HalfSpaceBody:
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
         return np.asarray(np.diff(T.indptr) > 0)
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> np.ndarray:
         return np.asarray(self.at_rest + self.motions @ multipliers + self._compliance_product(force))
 
     def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.problem.coupled import BodyTerm, LocalTerm
+
 if TYPE_CHECKING:
     from contactopt.bodies.fields import Fields
     from contactopt.problem.chart import Chart
@@ -33,18 +35,20 @@ if TYPE_CHECKING:
 class Mesh:
     """The finite elements behind a contact surface, for couplings that integrate over it.
 
-    basis      scikit-fem basis of the displacement, which holds the mesh;  degree  of the displacement, 1 or 2
-    facets     (f,) numbers of the mesh facets that make up the surface
+    kind       name of the reference element, a key of contactopt.bodies.elements.FACES;  degree  of the displacement, 1 or 2
+    faces      (f, j) nodes of the faces that make up the surface: corners in cyclic order, then those on edges, then the centre
+    outward    (dim, f) their mean outward normals
     measure    factor of all integrals (thickness, mirror images), and whether they also carry the radius r
-    locations  (dim, nodes) positions of all nodes of the body [length];  unknowns (dim, nodes) their displacement unknowns
+    locations  (dim, nodes) positions of the nodes [length];  unknowns (dim, nodes) their displacement unknowns
     held       (n,) mask of the unknowns that are not free
     curve      function (dim, j) -> (dim, j) that puts points of the facets on the surface that the mesh stands for; None:
                the facets are this surface
     """
 
-    basis: Any
+    kind: str
     degree: int
-    facets: np.ndarray
+    faces: np.ndarray
+    outward: np.ndarray
     measure: tuple[float, bool]
     locations: np.ndarray
     unknowns: np.ndarray
@@ -70,6 +74,18 @@ class Equilibrium:
     diagonal: np.ndarray
     free: np.ndarray
     low_rank: tuple[np.ndarray, np.ndarray]
+
+    def term(self, T: sp.csr_matrix) -> LocalTerm:
+        """The part of T C T' for a map T (rows, n) of the contact unknowns, before condensation."""
+        left, right = self.low_rank
+        return LocalTerm(T[:, self.free], self.stiffness, self.cycle, self.diagonal, (T @ left, T @ right))
+
+
+class Equilibrated(Protocol):
+    """The linear system of a body that is solved by iteration, wherever the body is: Equilibrium is that of a body here."""
+
+    def term(self, T: sp.csr_matrix) -> BodyTerm:
+        """The part of T C T' for a map T (rows, n) of the contact unknowns, before condensation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +201,7 @@ class Body(Protocol):
     def parallel(self) -> bool: ...
 
     @property
-    def equilibrium(self) -> Equilibrium | None:
+    def equilibrium(self) -> Equilibrated | None:
         """Its linear system where it is solved by iteration; None where products are direct."""
 
     def product(self, T: sp.csr_matrix) -> Product:
@@ -200,8 +216,11 @@ class Body(Protocol):
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
         """Mask (rows,) of the rows of T C T' that are not zero: what the body's compliance moves."""
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """U (n,) under contact forces (n,) and multipliers (p,)."""
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> np.ndarray:
+        """U (n,) under contact forces (n,) and multipliers (p,).
+
+        `free` are the unknowns of `equilibrium` under these forces, where they are known; they are not solved for again then.
+        """
 
     def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of U (n,) and of the balance of the free motions (p,) by the material's constant 'E' or 'nu'.

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.protocol import Surface
+from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.problem.operators import Product
 from contactopt.scenes.scene import Rigid, Scene
@@ -89,7 +91,7 @@ class RigidBody:
         if self.part.gap is None:
             return np.zeros(other.points.shape[1])
         given = self.part.gap(other.places) if callable(self.part.gap) else self.part.gap
-        gap = np.asarray(given, dtype=float).ravel()
+        gap = real_array(f"the gap of rigid body '{self.name}'", given).ravel()
         if gap.shape != other.places.shape[1:] or not np.all(np.isfinite(gap)):
             raise InputError(f"the gap of rigid body '{self.name}' must give one finite number per contact node.")
         return np.asarray(other.weights @ gap)
@@ -112,7 +114,7 @@ class RigidBody:
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
         return np.zeros(T.shape[0], dtype=bool)
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> np.ndarray:
         return np.asarray(self.at_rest + self.motions @ multipliers + np.roll(force, len(self.components)))
 
     def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,11 +5,14 @@ Exit codes: 0 done (run: solved, and to the accuracy asked for), 1 not solved, 2
 
 from __future__ import annotations
 
+import argparse
 import logging
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
+from contactopt.bodies.ranks import Team, launch, leave, serve, world
+from contactopt.cli.commands import run
 from contactopt.cli.parser import make_parser
 from contactopt.errors import InputError
 
@@ -18,19 +21,47 @@ __all__ = ["main", "make_parser"]
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code: 0 solved, 1 not solved, 2 bad input."""
-    options = make_parser().parse_args(arguments)
+    told = sys.argv[1:] if arguments is None else list(arguments)
+    options = make_parser().parse_args(told, argparse.Namespace(team=None, ranks=None))
     with _logging(options.verbose, options.quiet):
-        try:
-            return int(options.command(options))
-        except InputError as error:
-            print(f"contactopt: {error}", file=sys.stderr)
-            return 2
-        except MemoryError:
-            print("contactopt: this needs more memory than there is; take fewer elements.", file=sys.stderr)
-            return 2
-        except KeyboardInterrupt:
-            print("contactopt: interrupted", file=sys.stderr)
-            return 130
+        return _answered(lambda: _execute(options, told))
+
+
+def _answered(command: Callable[[], int]) -> int:
+    """The exit code of a command; what ends it is said in one sentence."""
+    try:
+        return int(command())
+    except InputError as error:
+        print(f"contactopt: {error}", file=sys.stderr)
+        return 2
+    except MemoryError:
+        print("contactopt: this needs more memory than there is; take fewer elements.", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("contactopt: interrupted", file=sys.stderr)
+        return 130
+
+
+def _execute(options: argparse.Namespace, told: list[str]) -> int:
+    """One command; where mpiexec started several ranks, rank 0 executes it and the others serve."""
+    if (comm := world()) is None:
+        return int(options.command(options)) if options.ranks is None else launch(options.ranks, told)
+    if comm.rank:
+        serve(comm)
+        return 0
+    options.team = Team(comm)
+    try:
+        return leave(_answered(lambda: _on_ranks(options)))
+    finally:
+        options.team.dismiss()
+
+
+def _on_ranks(options: argparse.Namespace) -> int:
+    if options.command is not run:
+        raise InputError("only the command 'run' uses several ranks; start the others without mpiexec.")
+    if options.ranks not in (None, options.team.size):
+        raise InputError(f"--ranks {options.ranks} was asked for, but mpiexec started {options.team.size} ranks.")
+    return run(options)
 
 
 @contextmanager

@@ -62,12 +62,17 @@ def run(options: argparse.Namespace) -> int:
         figures=tuple(options.figures),
         html=options.html,
         note=lambda text: None if silent else print(f"  {text}", file=sys.stderr, flush=True),
+        team=options.team,
         **(changes | given),
     )
     if options.json:
         print(json.dumps(result.summary, indent=2))
     else:
         _print_result(result, out)
+        if options.team is not None:
+            print(
+                f"{options.team.size} ranks, {options.team.traffic.messages} messages, {options.team.traffic.length} bytes"
+            )
     return 0 if result.solution.solved and (result.estimate is None or result.estimate.reached) else 1
 
 

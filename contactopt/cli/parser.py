@@ -93,6 +93,9 @@ def _run(run: argparse.ArgumentParser) -> None:
         help="what --accuracy bounds: " + ", ".join(QUANTITIES) + "; of one pair NAME:PAIR",
     )
     run.add_argument("--adaptive", action="store_true", help="refine only where the quantity needs it")
+    run.add_argument(
+        "--ranks", type=int, metavar="N", help="processes among which the bodies are dealt out (needs mpi4py)"
+    )
     run.add_argument("--tol", type=float, metavar="T", help="bound on the natural-map residual (1e-8)")
     pictures = run.add_mutually_exclusive_group()
     pictures.add_argument(

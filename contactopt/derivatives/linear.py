@@ -14,7 +14,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.linalg as la
@@ -25,6 +25,7 @@ from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.coupled import CoupledForm
 from contactopt.problem.operators import InterfaceOperator
+from contactopt.problem.stacked import Stacked, Vector, norm
 from contactopt.solving.constants import LOOSE
 from contactopt.solving.kernels.bonded import Bonded
 from contactopt.solving.kernels.coupled import fitted
@@ -267,7 +268,7 @@ class Coupled:
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
         tangent, form, contacts = self.tangent, self.form, self.contacts
-        N, n, sign = form.size, len(tangent.closed), -1.0 if transposed else 1.0
+        n, sign = len(tangent.closed), -1.0 if transposed else 1.0
         inverse = contacts.inverse(transposed)
 
         def forces(x: np.ndarray) -> np.ndarray:
@@ -276,37 +277,38 @@ class Coupled:
             full[tangent.closed] = x[:n]
             return tangent.slope_transposed(full) if transposed else full
 
-        def product(x: np.ndarray) -> np.ndarray:
-            X, rest = x[:N], x[N:]
-            r = forces(rest)
-            bodies = form.stiffness(X) - sign * np.asarray(form.trace.T @ r)
-            lower = contacts.product(rest, transposed, lambda y: form.rest(y) + sign * np.asarray(form.trace @ X))
-            return np.concatenate([bodies, lower])
+        def product(x: Stacked) -> Stacked:
+            X, rest = Stacked(x.parts[:-1]), x.parts[-1]
+            bodies = form.stiffness(X) - sign * form.pulled(forces(rest))
+            lower = contacts.product(rest, transposed, lambda y: form.moved(sign * X, y))
+            return Stacked((*bodies.parts, lower))
 
-        def precondition(x: np.ndarray) -> np.ndarray:
-            rest = inverse(x[N:])
-            return np.concatenate([form.approximate(x[:N] + sign * np.asarray(form.trace.T @ forces(rest))), rest])
+        def precondition(x: Stacked) -> Stacked:
+            rest = inverse(x.parts[-1])
+            bodies = form.approximate(Stacked(x.parts[:-1]) + sign * form.pulled(forces(rest)))
+            return Stacked((*bodies.parts, rest))
 
         rho = np.repeat(tangent.rho, tangent.problem.dim)[tangent.closed]
         share = rho**0.5 if transposed else rho**-0.5
-        weights = np.concatenate([form.diagonal**-0.5, share, np.ones(len(tangent.problem.s))])
-        whole = np.concatenate([np.zeros(N), right])
+        weights = Stacked((*(form.diagonal() ** -0.5).parts, np.concatenate([share, np.ones(len(tangent.problem.s))])))
+        none = form.pulled(np.zeros(tangent.problem.q.size))
+        whole = Stacked((*none.parts, right))
         found = refined(
             product, lambda rest: flexible_gmres(product, precondition, rest, weights, ROUND), whole, weights
         )
-        return found[N:]
+        return np.asarray(found.parts[-1])
 
 
-def refined(product: Act, solve: Act, right: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def refined(product: Callable[[Any], Any], solve: Callable[[Any], Any], right: Vector, weights: Vector) -> Any:
     """x with |W (right - A x)| <= ACCURACY |W right| from solves of what is left; InputError if that is out of reach."""
-    x, rest = np.zeros(len(right)), right
-    size = last = float(np.linalg.norm(weights * right))
+    x, rest = 0.0 * right, right
+    size = last = norm(weights * right)
     for _ in range(ROUNDS):
         if last <= ACCURACY * size:
             return x
         x = x + solve(rest)
         rest = right - product(x)
-        now = float(np.linalg.norm(weights * rest))
+        now = norm(weights * rest)
         if not now < 0.5 * last:
             break
         last = now

@@ -86,7 +86,9 @@ class Parameter:
 
     def pairs(self, scene: Scene) -> list[Any]:
         """The pairs of surfaces whose friction it is."""
-        return [pair for pair in scene.pairs if self.owner in ("", pair.name) and pair.law != "frictionless"]
+        return [
+            pair for pair in scene.pairs if self.owner in ("", pair.name) and pair.law not in ("frictionless", "tied")
+        ]
 
     def _friction(self, pair: Any) -> float:
         if np.ndim(pair.mu) or callable(pair.mu):

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import Body, Equilibrium
-from contactopt.problem.coupled import Act, CoupledForm
+from contactopt.bodies.protocol import Body
+from contactopt.problem.coupled import BodyTerm, CoupledForm
 
 
 def coupled_form(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> CoupledForm:
@@ -21,26 +21,14 @@ def coupled_form(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> Coupl
     maps
         Their signed maps B (k dim, n), as in contactopt.interface.reduction.
     """
-    systems: list[Equilibrium] = []
-    traces, left, right, others = [], [], [], []
+    terms: list[BodyTerm] = []
+    others = []
     for body, B in zip(bodies, maps):
         if body.equilibrium is not None:
-            systems.append(body.equilibrium)
-            traces.append(B[:, body.equilibrium.free])
-            left.append(B @ body.equilibrium.low_rank[0])
-            right.append(B @ body.equilibrium.low_rank[1])
+            terms.append(body.equilibrium.term(B))
         elif body.moved(B).any():
             others.append(body.product(B))
-    ends = np.cumsum([len(system.free) for system in systems])[:-1]
-    L, R = np.concatenate(left, axis=1), np.concatenate(right, axis=1)
-
-    def all_bodies(acts: Sequence[Act]) -> Act:
-        """One body after the other: threads share the products of each, so that a small body never waits for a large one."""
-
-        def act(X: np.ndarray) -> np.ndarray:
-            return np.concatenate([own(x) for own, x in zip(acts, np.split(X, ends))])
-
-        return act
+    L, R = (np.concatenate([term.low_rank[side] for term in terms], axis=1) for side in (0, 1))
 
     def rest(r: np.ndarray) -> np.ndarray:
         total = L @ (R.T @ r)
@@ -48,10 +36,4 @@ def coupled_form(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> Coupl
             total += product(r[:, None], None)[:, 0]
         return np.asarray(total)
 
-    return CoupledForm(
-        sp.hstack(traces, format="csr"),
-        all_bodies([system.stiffness for system in systems]),
-        all_bodies([system.cycle for system in systems]),
-        rest,
-        np.concatenate([system.diagonal for system in systems]),
-    )
+    return CoupledForm(tuple(terms), rest)

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 import skfem
 
-from contactopt.bodies.elements import FACES, face_nodes
+from contactopt.bodies.elements import FACES
 
 # kind of the elements -> corners of a face, shape functions of the displacement by degree
 _SHAPES = {
@@ -165,26 +165,24 @@ def evaluate(element: skfem.Element, at: np.ndarray) -> tuple[np.ndarray, np.nda
 
 def faces_of(
     name: str,
-    basis: skfem.CellBasis,
+    kind: str,
     degree: int,
-    facets: np.ndarray,
+    nodes: np.ndarray,
+    outward: np.ndarray,
     weight: tuple[float, bool],
     points: np.ndarray,
     curve: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Faces:
-    """The faces of some facets of a body's mesh.
+    """The faces that make up the surface of a body.
 
     Parameters
     ----------
-    basis   of the displacement of that degree
-    facets  (f,) numbers of the facets in the mesh of the basis
-    points  (dim, n) coordinates of all nodes of the body [length]
-    name, weight, curve  as in Faces
+    nodes    (f, j) nodes of every face, as `faces` in Faces
+    outward  (dim, f) a vector for every face that points out of the body
+    name, kind, degree, weight, points, curve  as in Faces
     """
-    nodes, normals = face_nodes(basis, degree, facets)
-    kind = basis.mesh.refdom.__name__
     made = Faces(name, kind, degree, points, nodes, np.ones(len(nodes)), weight, curve)
-    return replace(made, turn=np.sign(np.sum(face_normals(made) * normals, axis=0)))
+    return replace(made, turn=np.sign(np.sum(face_normals(made) * outward, axis=0)))
 
 
 def face_normals(surface: Faces) -> np.ndarray:

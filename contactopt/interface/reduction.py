@@ -19,6 +19,7 @@ import time
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -132,22 +133,15 @@ class Reduction:
 
         Bodies whose displacements came with the contact forces are not solved again.
         """
-        known = solution.displacements
-        systems = [None if known is None else body.equilibrium for body in self.bodies]
-        ends = np.cumsum([0 if system is None else len(system.free) for system in systems])
-        found = []
-        for body, B, own, system, end in zip(
-            self.bodies, self.maps, self.own_multipliers(solution.multipliers), systems, ends
-        ):
-            force = B.T @ solution.reactions.ravel()
-            if system is None or known is None:
-                found.append(body.displacement(force, own))
-                continue
-            left, right = system.low_rank
-            U = body.at_rest + body.motions @ own + left @ (right.T @ force)
-            U[system.free] += known[end - len(system.free) : end]
-            found.append(U)
-        return tuple(found)
+        known = [] if solution.displacements is None else list(solution.displacements.parts)
+        free = [known.pop(0) if known and body.equilibrium is not None else None for body in self.bodies]
+        parts = zip(self.bodies, self.maps, self.own_multipliers(solution.multipliers), free)
+
+        def displaced(part: tuple[Body, sp.csr_matrix, np.ndarray, Any]) -> np.ndarray:
+            body, B, own, X = part
+            return body.displacement(B.T @ solution.reactions.ravel(), own, X)
+
+        return each(displaced, parts, [body.parallel for body in self.bodies])
 
     def loaded(self, scene: Scene) -> Reduction:
         """The same bodies, coupling and Q under the loads of another scene of the same structure.
@@ -157,7 +151,8 @@ class Reduction:
         """
         _check_same(self.scene, scene)
         start = time.perf_counter()
-        bodies = tuple(old.loaded(scene, part) for old, part in zip(self.bodies, scene.parts))
+        pairs = zip(self.bodies, scene.parts)
+        bodies = each(lambda pair: pair[0].loaded(scene, pair[1]), pairs, [body.parallel for body in self.bodies])
         problem = _problem(scene, self.problem.Q, bodies, self.maps, self.couplings)
         seconds = {"load": time.perf_counter() - start}
         return replace(self, scene=scene, problem=problem, bodies=bodies, seconds=seconds)
@@ -179,10 +174,22 @@ def _check_same(one: Scene, other: Scene) -> None:
 
 
 def _same_mesh(one: Any, other: Any) -> bool:
-    """Whether two given meshes have the same nodes and elements; meshes that functions make are not compared."""
+    """Whether two meshes have the same nodes and elements; functions that make them are compared by what they enclose."""
     if callable(one) or callable(other):
-        return callable(one) and callable(other)
+        return callable(one) and callable(other) and not _differ(one, other)
     return one is other or (np.array_equal(one.p, other.p) and np.array_equal(one.t, other.t))
+
+
+def _differ(one: Any, other: Any) -> bool:
+    """Whether two values are known to be different: numbers, texts, arrays, and functions of one code that enclose such."""
+    if isinstance(one, (int, float, str, np.ndarray)) and isinstance(other, (int, float, str, np.ndarray)):
+        return not np.array_equal(one, other)
+    if isinstance(one, (tuple, list)) and isinstance(other, (tuple, list)):
+        return len(one) != len(other) or any(map(_differ, one, other))
+    if isinstance(one, FunctionType) and isinstance(other, FunctionType) and one.__code__ is other.__code__:
+        enclosed = [[cell.cell_contents for cell in f.__closure__ or ()] for f in (one, other)]
+        return _differ(enclosed[0], enclosed[1])
+    return False
 
 
 def reduce(
@@ -354,19 +361,20 @@ def _operator(
         return Convolution(sum(known[1:], known[0]))
     moved = [body.moved(B) for body, B in zip(bodies, maps)]
     moving = [(body, B, _rows(B)) for body, B, moves in zip(bodies, maps, moved) if moves.any()]
-    terms = [(body.product(B[rows]), rows, body.parallel) for body, B, rows in moving]
-    parallel = [marked for *_, marked in terms]
+    parallel = [body.parallel for body, *_ in moving]
+    acts = each(lambda term: term[0].product(term[1][term[2]]), moving, parallel)
+    terms = [(act, rows) for act, (*_, rows) in zip(acts, moving)]
 
     def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
-        def moves(term: tuple[Product, np.ndarray, bool]) -> tuple[np.ndarray, np.ndarray]:
+        def moves(term: tuple[Product, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
             """The columns that load a body at all, and what they make of it."""
-            act, rows, _ = term
+            act, rows = term
             load = X[rows]
             columns = np.flatnonzero(load.any(axis=0)) if len(couplings) > 1 else np.arange(X.shape[1])
             return columns, act(load[:, columns], accuracy) if len(columns) else load[:, columns]
 
         out = np.zeros(X.shape)
-        for (_, rows, _), (columns, own) in zip(terms, each(moves, terms, parallel)):
+        for (_, rows), (columns, own) in zip(terms, each(moves, terms, parallel)):
             out[np.ix_(rows, columns)] += own
         return out
 
@@ -386,7 +394,10 @@ def _filling(maps: Sequence[sp.csr_matrix]) -> int:
 def _entries(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> np.ndarray | sp.csr_array:
     """Q by its entries, symmetric to the last digit: an array, or sparse rows where most pairs share no body."""
     n = maps[0].shape[0]
-    parts = [(_rows(B), body.compliance(B[_rows(B)])) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    moving = [(body, B, _rows(B)) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    parallel = [body.parallel for body, *_ in moving]
+    made = each(lambda term: term[0].compliance(term[1][term[2]]), moving, parallel)
+    parts = [(rows, own) for (*_, rows), own in zip(moving, made)]
     if _filling(maps) < SPARSE * n**2:
         rows = np.concatenate([np.repeat(rows, len(rows)) for rows, _ in parts])
         columns = np.concatenate([np.tile(rows, len(rows)) for rows, _ in parts])

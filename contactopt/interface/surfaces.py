@@ -69,7 +69,7 @@ def _mesh(surface: Surface) -> Mesh:
 
 
 def _faces(name: str, mesh: Mesh) -> Faces:
-    return faces_of(name, mesh.basis, mesh.degree, mesh.facets, mesh.measure, mesh.locations, mesh.curve)
+    return faces_of(name, mesh.kind, mesh.degree, mesh.faces, mesh.outward, mesh.measure, mesh.locations, mesh.curve)
 
 
 def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:

@@ -45,6 +45,7 @@ from contactopt.errors import InputError
 from contactopt.problem.cones import split
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
+from contactopt.problem.stacked import Stacked
 
 ACTS = 1e-6  # share of the largest force from which on a contact's displacement counts fully in L
 ROUNDED = 1e-6  # share of a closed gap below which its remainder is rounding, where bodies move rigidly
@@ -63,7 +64,7 @@ class Moved:
 
     value: np.ndarray
     accuracy: float
-    displacements: np.ndarray | None = None
+    displacements: Stacked | None = None
 
 
 @dataclass(frozen=True)

@@ -4,67 +4,132 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.problem.counter import Counter
+from contactopt.problem.stacked import Stacked, in_turn
 
 Act = Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True, eq=False)
-class CoupledForm:
-    """Q = trace A^-1 trace' + rest, without a solve with A.
+class BodyTerm(Protocol):
+    """What one body with N displacement unknowns X adds to the coupled form. X is an array, or a vector elsewhere.
 
-    The N unknowns X are the free displacements of all bodies that are solved by iteration, one body after the other. They
-    are in equilibrium with the contact forces r (n,) where A X = trace' r, and then Q r = trace X + rest r.
+    With A its stiffness and T (n, N) the map from X to u, the body's part of Q is T A^-1 T' + L R'.
 
-    trace      (n, N) sparse map from the displacements X to u
-    stiffness  X (N,) -> A X, symmetric positive definite [force]
-    cycle      F (N,) -> B F, symmetric positive definite and close to A^-1 F, e.g. one V-cycle of multigrid per body
-    rest       r (n,) -> the part of Q r that needs no iteration: plates on supports, bodies with factors [length]
-    diagonal   (N,) diagonal of A [force / length]
-    counter    counts the applications of B; scaled forms share it
+    elsewhere  whether X lives in another process
+    size       N
+    low_rank   L and R (n, i)
     """
+
+    @property
+    def elsewhere(self) -> bool: ...
+
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def low_rank(self) -> tuple[np.ndarray, np.ndarray]: ...
+
+    def diagonal(self) -> Any:
+        """(N,) diagonal of A [force / length]."""
+
+    def stiffness(self, X: Any) -> Any:
+        """A X (N,) [force]."""
+
+    def cycle(self, F: Any) -> Any:
+        """B F (N,), B symmetric positive definite and close to A^-1, e.g. one V-cycle of multigrid [length]."""
+
+    def pulled(self, r: np.ndarray) -> Any:
+        """T' r (N,), the forces on the body under contact forces r (n,)."""
+
+    def started_trace(self, X: Any) -> Callable[[], np.ndarray]:
+        """T X (n,), when it is called; elsewhere the work is ordered at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class LocalTerm:
+    """The term of a body in this process, by its matrices and functions as in BodyTerm."""
 
     trace: sp.csr_matrix
     stiffness: Act
     cycle: Act
-    rest: Act
-    diagonal: np.ndarray
-    counter: Counter = field(default_factory=Counter)
+    entries: np.ndarray
+    low_rank: tuple[np.ndarray, np.ndarray]
+    elsewhere = False
 
     @property
     def size(self) -> int:
-        """Number N of displacement unknowns."""
         return self.trace.shape[1]
+
+    def diagonal(self) -> np.ndarray:
+        return self.entries
+
+    def pulled(self, r: np.ndarray) -> np.ndarray:
+        return np.asarray(self.trace.T @ r)
+
+    def started_trace(self, X: np.ndarray) -> Callable[[], np.ndarray]:
+        made = np.asarray(self.trace @ X)
+        return lambda: made
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledForm:
+    """Q = factor sum T A^-1 T' + rest over the bodies that are solved by iteration, without a solve with any A.
+
+    The unknowns X are the free displacements of these bodies, one part for each. They are in equilibrium with the contact
+    forces r (n,) where A X = factor T' r in every body, and then Q r = sum T X + rest r. In the methods below, A stands for
+    A / factor and B for factor B.
+
+    terms   of the bodies
+    rest    r (n,) -> the part of Q r that needs no iteration: plates on supports, bodies with factors [length]
+    factor  of the units of Q
+    counter counts the applications of B; scaled forms share it
+    """
+
+    terms: tuple[BodyTerm, ...]
+    rest: Act
+    factor: float = 1.0
+    counter: Counter = field(default_factory=Counter)
 
     @property
     def cycles(self) -> int:
         """Number of applications of B so far."""
         return self.counter.total
 
-    def approximate(self, F: np.ndarray) -> np.ndarray:
-        """B F (N,), counted."""
+    def diagonal(self) -> Stacked:
+        """The diagonal of A."""
+        return Stacked(tuple(in_turn(lambda term: term.diagonal() / self.factor, self.terms)))
+
+    def pulled(self, r: np.ndarray) -> Stacked:
+        """T' r, the forces on the bodies under contact forces r (n,)."""
+        return Stacked(tuple(in_turn(lambda term: term.pulled(r), self.terms)))
+
+    def stiffness(self, X: Stacked) -> Stacked:
+        """A X."""
+        return Stacked(tuple(in_turn(lambda term, own: term.stiffness(own) / self.factor, self.terms, X.parts)))
+
+    def approximate(self, F: Stacked) -> Stacked:
+        """B F, counted."""
         self.counter.add()
-        return self.cycle(F)
+        return Stacked(tuple(in_turn(lambda term, own: term.cycle(own) * self.factor, self.terms, F.parts)))
 
-    def moved(self, X: np.ndarray, r: np.ndarray) -> np.ndarray:
-        """trace X + rest r (n,), which is Q r in equilibrium."""
-        return np.asarray(self.trace @ X + self.rest(r))
+    def moved(self, X: Stacked, r: np.ndarray) -> np.ndarray:
+        """T X + rest r (n,), which is Q r in equilibrium."""
+        started = in_turn(lambda term, own: term.started_trace(own), self.terms, X.parts)
+        total = self.rest(r)
+        for own in started:
+            total = total + own()
+        return total
 
-    def unbalanced(self, X: np.ndarray, r: np.ndarray) -> np.ndarray:
-        """trace' r - A X (N,), the forces that are missing to equilibrium."""
-        return np.asarray(self.trace.T @ r - self.stiffness(X))
+    def unbalanced(self, X: Stacked, r: np.ndarray) -> Stacked:
+        """T' r - A X, the forces that are missing to equilibrium."""
+        return self.pulled(r) - self.stiffness(X)
 
     def scaled(self, factor: float, added: np.ndarray) -> CoupledForm:
         """The form of factor Q + diag(added), whose displacements X are in units in which A is A / factor."""
-        stiffness, cycle, rest = self.stiffness, self.cycle, self.rest
-        return replace(
-            self,
-            stiffness=lambda X: stiffness(X) / factor,
-            cycle=lambda F: factor * cycle(F),
-            rest=lambda r: factor * rest(r) + added * r,
-            diagonal=self.diagonal / factor,
-        )
+        rest = self.rest
+        return replace(self, rest=lambda r: factor * rest(r) + added * r, factor=factor * self.factor)

@@ -9,6 +9,7 @@ import numpy as np
 
 from contactopt.cards import card, count, line
 from contactopt.problem.feasibility import Infeasible
+from contactopt.problem.stacked import Stacked
 
 
 class Status(Enum):
@@ -45,7 +46,7 @@ class Solution:
                  phase of their own names it: recovery, the coarse meshes before this one, the phases of a reduction
     notes        sentences about what the solve did otherwise than expected: a fallback, a stage that failed
     proof        status `infeasible`: the ray that proves that there is no solution
-    displacements  (N,) of the bodies that are solved by iteration, from methods that work on them (the unknowns X of
+    displacements  of the bodies that are solved by iteration, from methods that work on them (the unknowns X of
                  contactopt.problem.coupled) [length]; None from all others
     """
 
@@ -60,7 +61,7 @@ class Solution:
     message: str = ""
     notes: tuple[str, ...] = ()
     proof: Infeasible | None = None
-    displacements: np.ndarray | None = None
+    displacements: Stacked | None = None
 
     @property
     def products(self) -> int:

@@ -75,7 +75,7 @@ class Contact:
 def check_friction(mu: Any) -> None:
     """Raise InputError unless mu is a number, or an array of numbers, that are not negative."""
     name = "the friction coefficient mu"
-    if np.ndim(mu) == 0:
+    if not isinstance(mu, (list, tuple)) and np.ndim(mu) == 0:
         check_number(name, mu, low=0.0, closed=True)
     elif np.any(real_array(name, mu) < 0):
         raise InputError(f"{name} must not be negative; its least value is {np.min(mu):g}.")

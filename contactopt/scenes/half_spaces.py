@@ -26,9 +26,32 @@ def hertz_half_space(
     force: float = 100.0,
     elements: int = 48,
 ) -> Scene:
-    """A rigid sphere, in Hertz's approximation a paraboloid, pressed on a half-space.
+    """A rigid sphere, in Hertz's approximation a paraboloid, pressed on a half-space without a mesh.
 
-    Sizes in mm, force in N; elements across the contact radius. With mu = 0 Hertz's solution is exact.
+    Lengths are in mm, forces in N and stresses in MPa.
+
+    Parameters
+    ----------
+    radius
+        Of the sphere.
+    material
+        Of the half-space.
+    mu
+        Friction coefficient.
+    force
+        Total force on the sphere, positive in compression.
+    elements
+        Number of points across the contact radius.
+
+    Returns
+    -------
+    Scene
+        With Hertz's solution, which is exact for mu = 0.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive.
     """
     check_positive(radius=radius, force=force)
     hertz = hertz_point(force, radius, contact_modulus(material))
@@ -54,11 +77,36 @@ def cattaneo_half_space(
     shear: float = 25.0,
     elements: int = 32,
 ) -> Scene:
-    """A sphere pressed on a flat body of the same material, both half-spaces, then pushed sideways by `shear`.
+    """A sphere pressed on a flat body of the same material, both half-spaces without a mesh, then pushed sideways.
 
-    Normal and tangential tractions do not disturb each other because the materials are the same. With nu = 0 the solution of
-    Cattaneo and Mindlin is exact; otherwise slip is not everywhere along the shear. Put on at once, the loads give the same answer
-    as one after the other. Sizes in mm, forces in N; elements across the contact radius.
+    Normal and tangential tractions do not disturb each other because the materials are the same. Put on at once, the
+    loads give the same answer as one after the other. Lengths are in mm, forces in N and stresses in MPa.
+
+    Parameters
+    ----------
+    radius
+        Of the sphere.
+    material
+        Of both bodies. With nu = 0 the solution of Cattaneo and Mindlin is exact; otherwise slip is not everywhere
+        along the shear.
+    mu
+        Friction coefficient.
+    force
+        Total normal force, positive in compression.
+    shear
+        Total tangential force.
+    elements
+        Number of points across the contact radius.
+
+    Returns
+    -------
+    Scene
+        With the solution of Cattaneo and Mindlin.
+
+    Raises
+    ------
+    InputError
+        If a size is not positive, or the shear is beyond the friction bound.
     """
     check_positive(radius=radius, force=force)
     check_number("shear", shear)
@@ -102,13 +150,39 @@ def rough(
     shift: float = 0.0,
     periodic: bool = True,
 ) -> Scene:
-    """A rigid self-affine rough surface pressed on a half-space by a mean pressure, then displaced along x by `shift`.
+    """A rigid self-affine rough surface pressed on a half-space by a mean pressure, then displaced along x.
 
-    The path, rough_sliding(), grows the shift until all contacts slip. Lengths in mm, pressure in MPa.
+    rough_sliding() makes the path on which the shift grows until all contacts slip. Lengths are in mm, forces in N
+    and stresses in MPa.
 
-    points    along each side of the square;  length  of its sides
-    hurst, shortest, slope, seed   of contactopt.scenes.surfaces.self_affine; by default `shortest` is a sixteenth of the length
-    periodic  whether surface and tractions repeat themselves beyond the square
+    Parameters
+    ----------
+    points
+        Number of points along each side of the square.
+    length
+        Of each side.
+    hurst, shortest, slope, seed
+        As for contactopt.scenes.surfaces.self_affine(); by default `shortest` is a sixteenth of the length.
+    material
+        Of the half-space.
+    mu
+        Friction coefficient.
+    pressure
+        Mean pressure on the square.
+    shift
+        Displacement of the rough surface along x.
+    periodic
+        Whether surface and tractions repeat themselves beyond the square.
+
+    Returns
+    -------
+    Scene
+        On a square grid of points.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range.
     """
     check_count("points", points)
     check_positive(length=length, pressure=pressure)
@@ -129,10 +203,23 @@ def rough(
 
 
 def rough_sliding(*, steps: int = 6, shift: float | None = None, **changes: object) -> tuple[Scene, ...]:
-    """The rough surface of rough(): pressed, then displaced along x in equal steps up to `shift`.
+    """The states of rough(): pressed, then displaced along x in equal steps.
 
-    By default the shift is 1.5 times the one at which contacts slip everywhere if the highest summit is flattened to the mean
-    height: tangential and normal displacements at full sliding are about as mu (2 - nu) to 2 (1 - nu) (Ciavarella 1998, Jaeger 1998).
+    Parameters
+    ----------
+    steps
+        Number of states after the first one.
+    shift
+        Of the last state. By default 1.5 times the shift at which contacts slip everywhere if the highest summit is
+        flattened to the mean height: tangential and normal displacements at full sliding are about as mu (2 - nu) to
+        2 (1 - nu) (Ciavarella 1998, Jaeger 1998).
+    changes
+        Arguments of rough().
+
+    Returns
+    -------
+    tuple of Scene
+        The states in their order.
     """
     check_count("steps", steps)
     first = rough(**changes)  # type: ignore[arg-type]

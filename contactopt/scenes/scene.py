@@ -149,7 +149,7 @@ class HalfSpace:
 
     The upper body fills the half z >= 0, the lower the half z <= 0 (in 2D: y). It has no support: it deforms under the contact
     forces alone, and as a whole it is held, displaced or pressed by a total force. Making and solving a problem in 3D takes about
-    1.2 kB of memory per point without friction and 2.1 kB with it (reports/half_spaces).
+    1.2 kB of memory per point without friction and 2.8 kB with it (reports/half_spaces).
 
     points        places of the contact points along each direction of the surface, evenly spaced: (x,) in 2D, (x, y) in 3D
                   [length]; or a function (elements, zone) -> such places. Each point stands for a cell about it

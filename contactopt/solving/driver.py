@@ -24,6 +24,7 @@ from contactopt.problem import (
 from contactopt.problem.balance import escape, sentence
 from contactopt.problem.certificate import Moved
 from contactopt.problem.operators import InterfaceOperator, diagonal, loosened
+from contactopt.problem.stacked import Stacked
 from contactopt.solving.deadline import TimeUp, until
 from contactopt.solving.methods import Iterate, Known, Method, default_method, find_method, solvers_of, solves
 from contactopt.solving.notes import collected
@@ -218,7 +219,7 @@ class _Recorder:
         self.problem, self.scales, self.tol, self.change_tol = problem, scales, tol, change_tol
         self.max_iterations, self.time_limit, self.progress = max_iterations, time_limit, progress
         self.reactions, self.multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
-        self.displacements: np.ndarray | None = None
+        self.displacements: Stacked | None = None
         self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
         self.history: list[dict[str, float]] = []
         self.previous = self.reactions

@@ -1,4 +1,4 @@
-"""What do CalculiX and contactopt cost on the punch at a hundred thousand unknowns, in the plane and in space?
+"""What do CalculiX and contactopt cost on the punch at more than a hundred thousand unknowns, in the plane and in space?
 
 `python -m experiments.questions.calculix_large [--limit seconds]` compares CPU times of whole runs, because wall times need a
 machine without other work. CalculiX solves with its direct solver, node-to-surface penalty contact, at the factor that the

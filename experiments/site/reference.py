@@ -223,7 +223,11 @@ def method_page(site: Path, name: str) -> str:
     module, cls, what = METHODS[name]
     method = getattr(importlib.import_module(module), cls)
     rows = [(f"`{f.name}`", f"`{f.default!r}`") for f in dataclasses.fields(method)]
-    listed = f"{table(('setting', 'default'), rows)}\n{inspect.getdoc(method)}\n" if rows else "It has no settings.\n"
+    listed = (
+        f"{table(('setting', 'default'), rows)}\n{as_block(inspect.getdoc(method) or '')}\n"
+        if rows
+        else "It has no settings.\n"
+    )
     notes = site / "notes" / f"{name}.md"
     by_hand = notes.read_text() if notes.exists() else ""
     source = as_block(inspect.getdoc(importlib.import_module(module)) or "")

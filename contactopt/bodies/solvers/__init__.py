@@ -22,6 +22,11 @@ SOLVERS = {
         "MultigridSolver",
         "conjugate gradients with a V-cycle of smoothed aggregation (pyamg)",
     ),
+    "petsc": (
+        "contactopt.bodies.solvers.petsc",
+        "PetscSolver",
+        "conjugate gradients with PETSc's multigrid (petsc4py)",
+    ),
 }
 
 

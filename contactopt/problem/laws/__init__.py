@@ -12,6 +12,7 @@ form with a closed convex set K_i of forces per contact and an opening g_i that 
     associated     |r_t| <= mu r_n                                     0: slip itself opens the gap by mu |u_t|
     tresca         r_n >= 0, |r_t| <= bound                            0
     bilateral      |r_t| <= mu |r_n|, the bound taken as given         0
+    tied           all                                                 0
 
 Sources: De Saxce, Feng (1998), The bipotential method; Alart, Curnier (1991), A mixed formulation for frictional contact
 problems prone to Newton like solution methods.
@@ -46,6 +47,7 @@ LAWS = {
         "Coulomb's cone; slip opens the gap by mu |u_t|",
     ),
     "frictionless": ("contactopt.problem.laws.frictionless", "Frictionless", "contact that may open; no friction"),
+    "tied": ("contactopt.problem.laws.tied", "Tied", "surfaces glued to each other"),
 }
 
 
@@ -68,11 +70,13 @@ class Law:
     convex        solutions minimise r' Q r / 2 + q' r over a fixed convex set, and `project` is the projection on it
     proportional  the friction bound is mu |r_n|, with mu the coefficient
     dilatant      slip opens the gap
+    bounded       tangential forces have a bound
     """
 
     convex: bool = False
     proportional: bool = False
     dilatant: bool = False
+    bounded: bool = True
 
     def __post_init__(self) -> None:
         for name in self.parameters:

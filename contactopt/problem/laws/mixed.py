@@ -25,7 +25,7 @@ class Mixed(Law):
         for law, own in zip(self.parts, self.members, strict=True):
             if law.contacts != len(own):
                 raise InputError(f"a law of {law.contacts} contacts was given for {len(own)} of them.")
-        for flag, together_ in (("convex", all), ("proportional", all), ("dilatant", any)):
+        for flag, together_ in (("convex", all), ("proportional", all), ("dilatant", any), ("bounded", all)):
             object.__setattr__(self, flag, together_(getattr(law, flag) for law in self.parts))
 
     @property

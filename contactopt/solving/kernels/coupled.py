@@ -18,12 +18,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 from contactopt.problem.coupled import CoupledForm
+from contactopt.problem.stacked import Stacked, norm
 from contactopt.problem.threads import one_blas_thread
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.alart_curnier import coulomb_equations, glued_contacts, glued_projection
@@ -44,9 +46,9 @@ Known = tuple[np.ndarray, np.ndarray, Moved]  # reactions (k, dim), multipliers 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Displacements X (N,), contact forces r (k, d) and multipliers (p,)."""
+    """Displacements X of the bodies, contact forces r (k, d) and multipliers (p,)."""
 
-    X: np.ndarray
+    X: Stacked
     r: np.ndarray
     multipliers: np.ndarray
 
@@ -59,45 +61,46 @@ class Coupled:
     form: CoupledForm
     P: Preconditioner
 
-    @property
-    def weights(self) -> np.ndarray:
-        """(N + k d + p,) weights of the residuals: in units of the root of an energy, whatever the mesh."""
+    @cached_property
+    def weights(self) -> Stacked:
+        """Weights of the residuals of X, r and the balance: in units of the root of an energy, whatever the mesh."""
         r = np.repeat(self.equations.rho**-0.5, self.equations.q.shape[1])
-        return np.concatenate([self.form.diagonal**-0.5, r, np.ones(len(self.equations.s))])
+        return joined(self.form.diagonal() ** -0.5, r, np.ones(len(self.equations.s)))
 
-    def linearised(self, at: State) -> tuple[np.ndarray, Linearised]:
-        """The right side (N + k d + p,) of Newton's step there, and its contact equations."""
+    def linearised(self, at: State) -> tuple[Stacked, Linearised]:
+        """The right side of Newton's step there, in parts for X, r and the balance, and its contact equations."""
         equations = self.equations
         u = (self.form.moved(at.X, at.r.ravel()) + equations.V @ at.multipliers).reshape(at.r.shape) + equations.q
         P, D = equations.project(at.r - equations.rho[:, None] * u)
         balance = equations.V.T @ at.r.ravel() + equations.s
         forces = self.form.unbalanced(at.X, at.r.ravel())
-        return np.concatenate([forces, (P - at.r).ravel(), -balance]), Linearised(equations, D)
+        return joined(forces, (P - at.r).ravel(), -balance), Linearised(equations, D)
 
-    def size(self, right: np.ndarray) -> float:
+    def size(self, right: Stacked) -> float:
         """The residual that belongs to a right side."""
-        return float(np.linalg.norm(self.weights * right))
+        return norm(self.weights * right)
 
-    def step(self, at: State, right: np.ndarray, linearised: Linearised, rtol: float) -> State | None:
+    def step(self, at: State, right: Stacked, linearised: Linearised, rtol: float) -> State | None:
         """The state after Newton's step, or None if its linear system could not be solved."""
-        form, V, N, n = self.form, self.equations.V, self.form.size, at.r.size
+        form, V = self.form, self.equations.V
         inverse = linearised.rough(self.P)
         model = (lambda x: self.P @ x) if self.P.model is None else self.P.model.matvec
 
-        def product(x: np.ndarray) -> np.ndarray:
-            X, r, multipliers = np.split(x, [N, N + n])
+        def product(x: Stacked) -> Stacked:
+            X, r, multipliers = parted(x)
+            forces = form.stiffness(X) - form.pulled(r)
             moved = form.moved(X, r) + V @ multipliers
-            return np.concatenate([-form.unbalanced(X, r), linearised.rows(r, moved), V.T @ r])
+            return joined(forces, linearised.rows(r, moved), V.T @ r)
 
-        def precondition(x: np.ndarray) -> np.ndarray:
-            forces, error, balance = np.split(x, [N, N + n])
+        def precondition(x: Stacked) -> Stacked:
+            forces, error, balance = parted(x)
             r, multipliers = linearised.solve(model, inverse, error, -balance, INNER)
-            return np.concatenate([form.approximate(forces + form.trace.T @ r), r, multipliers])
+            return joined(form.approximate(forces + form.pulled(r)), r, multipliers)
 
         change = flexible_gmres(product, precondition, right, self.weights, rtol)
-        if not np.all(np.isfinite(change)):
+        if not np.isfinite(norm(change)):
             return None
-        X, r, multipliers = np.split(change, [N, N + n])
+        X, r, multipliers = parted(change)
         return State(at.X + X, at.r + r.reshape(at.r.shape), at.multipliers + multipliers)
 
     def judged(self, at: State, error: np.ndarray) -> Known:
@@ -109,8 +112,8 @@ class Coupled:
         form, r = self.form, at.r + error
         missing = form.unbalanced(at.X, r.ravel())
         correction = form.approximate(missing)
-        energy = float(at.X @ (form.trace.T @ r.ravel() - missing))
-        lacking = float(missing @ correction)
+        energy = at.X.dot(form.pulled(r.ravel()) - missing)
+        lacking = missing.dot(correction)
         accuracy = np.sqrt(lacking / energy) if energy > 0 else (np.inf if lacking else 0.0)
         better = at.X + correction
         return r, at.multipliers, Moved(form.moved(better, r.ravel()), float(accuracy), better)
@@ -132,7 +135,7 @@ def coupled_steps(
         with one_blas_thread():
             right, linearised = coupled.linearised(at)
             residual = coupled.size(right)
-            known = coupled.judged(at, right[form.size : form.size + at.r.size].reshape(at.r.shape))
+            known = coupled.judged(at, parted(right)[1].reshape(at.r.shape))
         yield known, residual
         rtol = min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else FIRST
         with one_blas_thread():
@@ -141,7 +144,8 @@ def coupled_steps(
 
 def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
     """The bonded solution of contactopt.solving.kernels.alart_curnier.cold_start, to FIRST, or no force at all."""
-    zero = State(np.zeros(coupled.form.size), np.zeros(problem.q.shape), np.zeros(len(problem.s)))
+    none = np.zeros(problem.q.shape)
+    zero = State(coupled.form.pulled(none.ravel()), none, np.zeros(len(problem.s)))
     glued = glued_contacts(problem)
     if not glued.any():
         return zero
@@ -160,26 +164,38 @@ def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
     too large than too small.
     """
     x = np.random.default_rng(0).normal(size=P.shape[0])
-    Qx = form.moved(form.approximate(np.asarray(form.trace.T @ x)), x)
+    Qx = form.moved(form.approximate(form.pulled(x)), x)
     factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / MARGIN, P.model
     stiff = None if model is None else lambda y: model @ y / factor
     return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
 
 
-def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN) -> np.ndarray:
-    """Displacements X (N,) close to A^-1 trace' r, by conjugate gradients with V-cycles."""
-    X, residual = np.zeros(form.size), np.asarray(form.trace.T @ r.ravel())
-    p, size, goal = np.zeros(form.size), 1.0, 0.0
+def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN) -> Stacked:
+    """Displacements X close to A^-1 T' r, by conjugate gradients with V-cycles."""
+    residual = form.pulled(r.ravel())
+    X, size, goal = 0.0 * residual, 1.0, 0.0
+    p = X
     for step in range(MOST_ITERATIONS):
         check_time()
         z = form.approximate(residual)
-        size, previous = float(np.einsum("i,i", residual, z)), size
+        size, previous = residual.dot(z), size
         goal = goal if step else rtol**2 * size
         if not size > goal:
             break
         p = z + (size / previous if step else 0.0) * p
         Ap = form.stiffness(p)
-        alpha = size / float(np.einsum("i,i", p, Ap))
-        X += alpha * p
-        residual -= alpha * Ap
+        alpha = size / p.dot(Ap)
+        X = X + alpha * p
+        residual = residual - alpha * Ap
     return X
+
+
+def joined(X: Stacked, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
+    """One vector of the parts of X, of r (k d,) and of multipliers (p,)."""
+    return Stacked((*X.parts, r, multipliers))
+
+
+def parted(x: Stacked) -> tuple[Stacked, np.ndarray, np.ndarray]:
+    """X, r and the multipliers of a joined vector."""
+    *X, r, multipliers = x.parts
+    return Stacked(tuple(X)), r, multipliers

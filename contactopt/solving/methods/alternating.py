@@ -72,7 +72,7 @@ class Alternating:
         return find(self.normal, QP).name, find(tangential, QP if dim == 2 else CONIC).name
 
     def solves(self, law: Law) -> bool:
-        return not law.dilatant
+        return law.bounded and not law.dilatant
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         pushes = np.any(np.abs(problem.V[:: problem.dim]) > 1e-9, axis=0)  # columns with normal entries

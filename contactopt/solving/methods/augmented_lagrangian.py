@@ -59,7 +59,7 @@ class AugmentedLagrangian:
 
     def solves(self, law: Law) -> bool:
         """The exact variant solves every law; Uzawa's holds friction bounds, which associated friction has not."""
-        return not (self.explicit and law.dilatant)
+        return law.bounded and not (self.explicit and law.dilatant)
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         return self._uzawa(problem, start) if self.explicit else self._exact(problem, start)

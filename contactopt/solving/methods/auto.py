@@ -10,9 +10,9 @@
 4. Where Q is sparse: interior-point paths drawn at random, PATHS of them, since one that ends early says nothing of the next;
    then the proximal loop from the best of all points, its weight falling slowly: jammed packings need hundreds of steps.
    When SPARSE_ROUND of them have not halved the residual, the same again, with twice the patience.
-5. Else the proximal loop from the best point. When ROUND outer iterations have not halved the residual, twice as many after each restart, the loop starts again from
-   contact forces drawn at random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
-   friction may have solutions that repel the loop and others that attract it.
+5. Else the proximal loop from the best point. When ROUND outer iterations have not halved the residual, twice as many after
+   each restart, the loop starts again from contact forces drawn at random (fixed seed, so that runs repeat) and larger than
+   those of the point it leaves: strong friction may have solutions that repel the loop and others that attract it.
 It ends where the driver's certificate or limits say so. There is no proof that it finds a solution: Coulomb's problem
 may have none.
 """

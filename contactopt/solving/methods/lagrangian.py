@@ -54,7 +54,7 @@ class Lagrangian:
         return NATIVE, NATIVE
 
     def solves(self, law: Law) -> bool:
-        return not law.dilatant
+        return law.bounded and not law.dilatant
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start

@@ -33,6 +33,9 @@ LOOSEST, TIGHTEST = 0.1, 1e-4  # relative accuracy of a step: while contacts sti
 ROUGH = 3e-2  # residual at which a coarse grid has done its work, over the size of the forces
 SURE = 1e-4  # and the coarsest grid, from which the others must not be led astray
 NEAR = 1e-8  # and from which on iterates of the finest grid are shown to the driver
+CLOSER = (
+    0.1  # residual of a given start over that of the coarse grids' answer from which on Newton's steps go on from it
+)
 STEPS = 30  # on a coarse grid
 TRIES = 80  # iterates of the default method there, where Newton's steps fail
 
@@ -69,7 +72,7 @@ class Nested:
         finest, at, last = levels[0], levels[0].evaluate(*point), np.inf
         if given is not None:
             other = finest.evaluate(*given)
-            point, at = (given, other) if other.residual < at.residual else (point, at)
+            point, at = (given, other) if other.residual < CLOSER * at.residual else (point, at)
         while True:
             if at.residual <= NEAR * max(1.0, float(np.linalg.norm(point[0]))) or at.residual > 0.5 * last:
                 yield (whole(problem, point[0] + at.error), point[1]), at.residual

@@ -53,7 +53,7 @@ class Tresca:
         return (find(name, QP if dim == 2 else CONIC).name,) * 2
 
     def solves(self, law: Law) -> bool:
-        return not law.dilatant
+        return law.bounded and not law.dilatant
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         convex = TrescaProblem(self.backends(problem.dim)[0], problem)

@@ -57,6 +57,10 @@ meshes made for another one.
 
 {cattaneo}
 
+The same in space, a sphere of linear bricks, pressed by 100 N and sheared by 30 N in one step:
+
+{solids}
+
 ## The elastic punch
 
 mu = .2; root mean squares of the errors of the force between the axis and a place, over its largest value, against matching
@@ -90,6 +94,7 @@ TABLES: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "press_fits": accuracy.press_fits,
     "rigid_punch": accuracy.rigid_punch,
     "cattaneo": accuracy.cattaneo,
+    "solids": accuracy.solids,
     "elastic_punch": accuracy.elastic_punch,
     "costs": cost.costs,
     "beside": beside.beside,

@@ -170,3 +170,23 @@ def cattaneo() -> list[dict[str, Any]]:
 def _squares(found: list[tuple[float, float, bool]]) -> np.ndarray:
     """Mean squares (2,) of the errors of pressure and traction."""
     return np.asarray(np.mean(np.array([f[:2] for f in found]) ** 2, axis=0))
+
+
+def solids() -> list[dict[str, Any]]:
+    """Two bodies in space, pressed and then sheared in one step, linear bricks; the exact tractions are those of Mindlin."""
+    rows = []
+    for sizes, carrier in (((6, 6), None), ((8, 8), None), ((6, 8), "lower"), ((8, 6), "upper"), ((6, 8), "upper")):
+        scene = apart(scenes.cattaneo(3, shear=30.0), *sizes, 1)
+        states = [_sheared(scene, share) for share in (0.0, 1.0)]
+        path = follow(states if carrier is None else [carried(state, carrier) for state in states])
+        problem, r = path.reduction.problem, path.solution.reactions
+        x, exact = np.linalg.norm(problem.coordinates[:2], axis=0), scene.reference
+        p, q = r[:, 0] / problem.areas, np.linalg.norm(r[:, 1:], axis=1) / problem.areas
+        own = sizes[0] if carrier == "upper" else sizes[1]
+        row: dict[str, Any] = {"elements": f"{sizes[0]}:{sizes[1]}"}
+        row |= {"contacts on": "matching nodes" if carrier is None else "fine side" if own == 8 else "coarse side"}
+        row |= {"unknowns": path.reduction.dofs, "contacts": problem.contacts}
+        row |= {"peak, rel. error": float(p.max() / exact.peak - 1)}
+        row |= {"p in L2": error(p, exact.pressure(x), problem.areas)}
+        rows.append(row | {"q in L2": error(q, np.abs(exact.shear(x)), problem.areas), "solved": path.solved})
+    return rows

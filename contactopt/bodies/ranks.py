@@ -1,0 +1,332 @@
+"""Processes that MPI started: rank 0 runs the program, the others keep objects for it and act on them.
+
+Rank 0 sends an order, a function with its arguments, and receives what it returned or raised. Or the result stays on its
+rank, and rank 0 holds a Kept that stands for it in later orders; then no message comes back. Every rank follows its orders
+one after the other. All messages are counted with their bytes.
+
+Whoever waits for a message sleeps between two looks, so that ranks that share a core do not take it from each other.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import traceback
+import weakref
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from contactopt.checks import check_count
+from contactopt.errors import InputError
+from contactopt.scenes.scene import Part, Scene
+
+ORDERS, FIRST, TICKETS = 1, 2, 30000  # tag of orders, and tags of replies: one per order, used again in turn
+SHORTEST, LONGEST = 1e-5, 1e-3  # sleep between two looks for a message [s]
+STARTED = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")  # set by mpiexec of Open MPI, and of MPICH and its kin
+OUTCOME = "CONTACTOPT_OUTCOME"  # environment variable: the file that takes the exit code of rank 0
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(eq=False)
+class Kept:
+    """An object that stays on its rank. It is freed there when nobody refers to this any more."""
+
+    rank: int
+    number: int
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _Reference, (self.number,)
+
+
+@dataclass(frozen=True)
+class _Reference:
+    """What a Kept is on its way to its rank."""
+
+    number: int
+
+
+@dataclass(frozen=True)
+class Raised:
+    """An exception on its way to rank 0, with the place where it was raised."""
+
+    error: BaseException
+    place: str
+
+
+@dataclass
+class Traffic:
+    """What was sent and received by rank 0: messages, and their length together in bytes."""
+
+    messages: int = 0
+    length: int = 0
+
+    def add(self, message: bytes | bytearray) -> None:
+        """Count one message."""
+        self.messages += 1
+        self.length += len(message)
+
+
+class Team:
+    """All ranks, seen from rank 0. Orders may be given by several threads at the same time."""
+
+    def __init__(self, comm: Any):
+        self.comm = comm
+        self.traffic = Traffic()
+        self._lock = threading.Lock()  # MPI need not allow threads at the same time
+        self._number = 0
+        self._sent: list[tuple[Any, bytes]] = []
+        self._freed: list[deque[int]] = [deque() for _ in range(comm.size)]
+
+    @property
+    def size(self) -> int:
+        """Number of ranks."""
+        return int(self.comm.size)
+
+    def ask(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Any:
+        """What the function returns on that rank; an exception that it raises is raised here."""
+        return self.start(rank, function, *arguments)()
+
+    def start(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
+        """The same in two steps: the work begins now, and the function returned waits for its end."""
+        tag = FIRST + self._next_number() % TICKETS
+        self._order(rank, (tag, function, arguments))
+
+        def end() -> Any:
+            reply = _receive(self.comm, self._lock, rank, tag)
+            with self._lock:
+                self.traffic.add(reply)
+            answer = pickle.loads(reply)
+            if isinstance(answer, Raised):
+                answer.error.add_note(f"on rank {rank}:\n{answer.place}")
+                raise answer.error
+            return answer
+
+        return end
+
+    def keep(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Kept:
+        """What stands for the result, which stays there. Nobody waits for it: whoever uses it learns of an exception."""
+        kept = Kept(rank, self._next_number())
+        self._order(rank, (None, function, arguments), kept.number)
+        weakref.finalize(kept, self._freed[rank].append, kept.number).atexit = False
+        return kept
+
+    def cpu(self) -> list[float]:
+        """CPU time of every rank so far [s]."""
+        return [time.process_time(), *(self.ask(rank, time.process_time) for rank in range(1, self.size))]
+
+    def dismiss(self) -> None:
+        """End the loops of all other ranks."""
+        for rank in range(1, self.size):
+            self._order(rank, None)
+        while self._sent:
+            self._forget_what_arrived()
+            time.sleep(SHORTEST)
+
+    def _next_number(self) -> int:
+        with self._lock:
+            self._number += 1
+            return self._number
+
+    def _order(self, rank: int, order: Any, number: int | None = None) -> None:
+        """Send without waiting; the bytes are kept until they have arrived."""
+        freed, waiting = [], self._freed[rank]
+        while waiting:
+            freed.append(waiting.popleft())
+        data = _packed((order, number, freed))
+        with self._lock:
+            self._sent.append((self.comm.Isend([data, _byte()], rank, ORDERS), data))
+            self.traffic.add(data)
+        self._forget_what_arrived()
+
+    def _forget_what_arrived(self) -> None:
+        with self._lock:
+            self._sent = [item for item in self._sent if not item[0].Test()]
+
+
+@dataclass(frozen=True)
+class RemotePart(Part):
+    """An elastic body that lives on a rank of a team."""
+
+    rank: int = 0
+    team: Team | None = None
+
+
+def spread(scene: Scene, team: Team) -> Scene:
+    """The scene with its elastic bodies dealt out to the ranks in turn, from rank 0 on. All others stay on rank 0."""
+    elastic = [part.name for part in scene.parts if isinstance(part, Part)]
+
+    def placed(part: Any) -> Any:
+        rank = elastic.index(part.name) % team.size if part.name in elastic else 0
+        return part if rank == 0 else RemotePart(**values_of(part), rank=rank, team=team)
+
+    return scene.with_parts(placed)
+
+
+def values_of(part: Part) -> dict[str, Any]:
+    """The arguments that make a part."""
+    return {item.name: getattr(part, item.name) for item in fields(Part)}
+
+
+def serve(comm: Any) -> None:
+    """Do what rank 0 orders until it dismisses this rank."""
+    kept: dict[int, Any] = {}
+    lock = threading.Lock()
+    while True:
+        order, number, freed = pickle.loads(_receive(comm, lock, 0, ORDERS))
+        if order is None:
+            return
+        for old in freed:
+            del kept[old]
+        result = _result(kept, *order[1:])
+        if number is not None:
+            kept[number] = result
+        else:
+            _send(comm, lock, _packed(result), 0, order[0])
+        del order, result
+
+
+def _result(kept: dict[int, Any], function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """What the function makes of its arguments, or the exception: its own, or that which an argument should have been."""
+    found = [kept[item.number] if isinstance(item, _Reference) else item for item in arguments]
+    for item in found:
+        if isinstance(item, Raised):
+            return item
+    try:
+        return function(*found)
+    except Exception as error:
+        return Raised(_portable(error), traceback.format_exc())
+
+
+def _portable(error: Exception) -> Exception:
+    """The exception itself, or where it cannot travel one that says the same."""
+    try:
+        return error if type(pickle.loads(pickle.dumps(error))) is type(error) else RuntimeError(str(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+
+
+def shipped(message: Any) -> bytes:
+    """Anything as bytes; functions that have no name, such as those that make the meshes of scenes, travel by their code."""
+    import cloudpickle
+
+    return bytes(cloudpickle.dumps(message))
+
+
+def _packed(message: Any) -> bytes:
+    return pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
+
+
+def _send(comm: Any, lock: threading.Lock, data: bytes, rank: int, tag: int) -> None:
+    with lock:
+        request = comm.Isend([data, _byte()], rank, tag)
+    _wait(lock, request.Test)
+
+
+def _receive(comm: Any, lock: threading.Lock, rank: int, tag: int) -> bytearray:
+    status = _mpi().Status()
+    _wait(lock, lambda: comm.Iprobe(rank, tag, status))
+    data = bytearray(status.Get_count(_byte()))
+    with lock:
+        comm.Recv([data, _byte()], rank, tag)
+    return data
+
+
+def _wait(lock: threading.Lock, done: Callable[[], bool]) -> None:
+    pause = SHORTEST
+    while True:
+        with lock:
+            if done():
+                return
+        time.sleep(pause)
+        pause = min(1.5 * pause, LONGEST)
+
+
+def _mpi() -> Any:
+    from mpi4py import MPI
+
+    return MPI
+
+
+def _byte() -> Any:
+    return _mpi().BYTE
+
+
+def world() -> Any:
+    """The communicator of all processes that mpiexec started with this one, None if it started no others.
+
+    Raises InputError if the packages of the extra `mpi` are missing.
+    """
+    if not any(os.environ.get(name, "1") != "1" for name in STARTED):
+        return None
+    try:
+        import cloudpickle  # noqa: F401
+
+        comm = _mpi().COMM_WORLD
+    except ImportError as error:
+        raise InputError("ranks need the packages mpi4py and cloudpickle: pip install 'contactopt[mpi]'.") from error
+    return comm if comm.size > 1 else None
+
+
+def launch(ranks: int, arguments: Sequence[str]) -> int:
+    """Start the command line on several ranks of this machine, each bound to a core while there are enough of them.
+
+    Every rank uses one BLAS thread unless the environment says otherwise. Returns the exit code of rank 0.
+
+    Parameters
+    ----------
+    ranks
+        How many processes.
+    arguments
+        Of the command line, without the name of the program.
+
+    Raises
+    ------
+    InputError
+        If the packages of the extra `mpi` are missing.
+    """
+    start = mpiexec(ranks)
+    with tempfile.TemporaryDirectory() as folder:
+        outcome = Path(folder) / "exit code"
+        environment = {name: "1" for name in ONE_THREAD} | dict(os.environ) | {OUTCOME: str(outcome)}
+        command = [*start, sys.executable, "-m", "contactopt", *arguments]
+        code = subprocess.run(command, env=environment, check=False).returncode
+        return int(outcome.read_text()) if outcome.exists() else ended_early(code)
+
+
+def mpiexec(ranks: int) -> list[str]:
+    """The beginning of a command that runs on several ranks of this machine; InputError where MPI is missing."""
+    check_count("the number of ranks", ranks)
+    program = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or shutil.which("mpiexec")
+    if program is None or find_spec("mpi4py") is None:
+        raise InputError("ranks need mpi4py and mpiexec: pip install 'contactopt[mpi]'.")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    placed = ["--bind-to", "core", "--map-by", "core"] if ranks <= cores else ["--oversubscribe", "--bind-to", "none"]
+    root = (
+        ["--allow-run-as-root"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
+    )  # whoever is root runs this as root
+    return [program, *root, *placed, "-n", str(ranks)]
+
+
+def ended_early(code: int) -> int:
+    """The exit code where rank 0 left none: a rank ended before the work was done, and mpiexec ended the others."""
+    why = f" by signal {code - 128}, which may mean that there was too little memory" if code > 128 else ""
+    print(f"contactopt: a rank was ended{why}; all others were stopped and nothing was written.", file=sys.stderr)
+    return code or 1
+
+
+def leave(code: int) -> int:
+    """The exit code for mpiexec: 0 where `launch` waits for the true one, because mpiexec explains every other at length."""
+    if OUTCOME not in os.environ:
+        return code
+    Path(os.environ[OUTCOME]).write_text(str(code))
+    return 0

@@ -1,0 +1,92 @@
+"""Vectors in parts: one array for each body, some of which may lie in other processes.
+
+A part is an array, or an object with the same operators that is `elsewhere` (contactopt.bodies.remote.Field). What is done
+with a part elsewhere is only ordered here; so the orders go out first, and all processes work at the same time. Sums are made
+part by part, wherever the parts are, so that the result does not depend on it.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+Act = Callable[..., Any]
+
+
+def in_turn(act: Act, *columns: Iterable[Any]) -> list[Any]:
+    """`act` on the entries of the columns row by row, first where the entry of the first column is elsewhere."""
+    rows = list(zip(*columns))
+    made = {i: act(*rows[i]) for here in (False, True) for i, row in enumerate(rows) if _here(row[0]) is here}
+    return [made[i] for i in range(len(rows))]
+
+
+def _here(part: Any) -> bool:
+    return not getattr(part, "elsewhere", False)
+
+
+@dataclass(frozen=True, eq=False)
+class Stacked:
+    """A vector in parts, with the operators of an array: entry by entry, or with a number."""
+
+    parts: tuple[Any, ...]
+    __array_ufunc__ = None  # NumPy's numbers leave the operators to this class
+
+    def _each(self, act: Act, other: Any) -> Stacked:
+        others = other.parts if isinstance(other, Stacked) else (other,) * len(self.parts)
+        return Stacked(tuple(in_turn(act, self.parts, others)))
+
+    def __add__(self, other: Any) -> Stacked:
+        return self._each(operator.add, other)
+
+    def __sub__(self, other: Any) -> Stacked:
+        return self._each(operator.sub, other)
+
+    def __mul__(self, other: Any) -> Stacked:
+        return self._each(operator.mul, other)
+
+    def __rmul__(self, factor: float) -> Stacked:
+        return self._each(operator.mul, factor)
+
+    def __truediv__(self, other: Any) -> Stacked:
+        return self._each(operator.truediv, other)
+
+    def __pow__(self, power: float) -> Stacked:
+        return self._each(operator.pow, power)
+
+    def __neg__(self) -> Stacked:
+        return self._each(operator.mul, -1.0)
+
+    def astype(self, kind: Any) -> Stacked:
+        """The vector in another precision."""
+        return self._each(lambda part, kind: part.astype(kind), kind)
+
+    def dot(self, other: Stacked) -> float:
+        """The scalar product."""
+        sums = in_turn(_started_dot, self.parts, other.parts)
+        return sum(own() for own in sums)
+
+
+Vector: TypeAlias = Any  # an array (n,) or a Stacked
+
+
+def _started_dot(x: Any, y: Any) -> Callable[[], float]:
+    """The scalar product of two parts; without BLAS, whose threads would spin until the next call."""
+    if not _here(x):
+        started: Callable[[], float] = x.started_dot(y)
+        return started
+    made = float(np.einsum("i,i", x, y))
+    return lambda: made
+
+
+def dot(x: Vector, y: Vector) -> float:
+    """x' y."""
+    return float(x.dot(y)) if isinstance(x, Stacked) else float(np.einsum("i,i", x, y))
+
+
+def norm(x: Vector) -> float:
+    """Euclidean norm."""
+    return float(np.sqrt(dot(x, x)))

@@ -1,0 +1,187 @@
+"""Bodies on ranks of their own: the same answers to the last digit, few and short messages, and no rank left alone."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contactopt import InputError, reduce, scenes, solve
+from contactopt.bodies.ranks import mpiexec
+from contactopt.cli import main
+from contactopt.scenes.slices import sliced
+
+pytest.importorskip("mpi4py")
+ROOT = Path(__file__).parents[1]
+PATIENCE = 300  # seconds; a test that needs them hangs
+
+COMPARISON = """
+import json, sys
+import numpy as np
+from dataclasses import replace
+import contactopt
+from contactopt import scenes
+from contactopt.bodies.ranks import Team, serve, spread, world
+from contactopt.scenes import PATHS
+from contactopt.scenes.slices import sliced
+
+comm = world()
+if comm.rank:
+    serve(comm)
+    sys.exit()
+
+def torn(elements, zone):
+    raise contactopt.InputError(f"torn on a rank of {comm_size()}.")
+
+def comm_size():
+    from contactopt.bodies.ranks import world
+    return f"{world().size}, this is {world().rank}"
+
+team = Team(comm)
+try:
+    flat = lambda **more: replace(scenes.flat_punch(2, elements=8), **more)
+    cases = {
+        "explicit": ("punch-2d", dict(elements=8)),
+        "implicit": ("punch-2d", dict(elements=8, Q="implicit")),
+        "multigrid": ("punch-3d", dict(elements=4, solver="multigrid")),
+        "axisymmetric with a zone": ("sphere", dict(elements=8)),
+        "three bodies, mortar": ("arch", {}),
+        "load path": ("cattaneo-2d", dict(elements=4)),
+        "slices": (sliced(flat(), "foundation", 3), {}),
+    }
+    found = {}
+    for case, (scene, options) in cases.items():
+        one = contactopt.run(scene, **options)
+        before = (team.traffic.messages, team.traffic.length)
+        many = contactopt.run(scene, team=team, **options)
+        found[case] = {
+            "same": bool(np.array_equal(one.solution.reactions, many.solution.reactions)),
+            "steps": (one.solution.iterations, many.solution.iterations),
+            "residuals": (one.solution.residual, many.solution.residual),
+            "stress": max(float(np.abs(a.stress - b.stress).max()) for a, b in zip(one.fields, many.fields)),
+            "messages": team.traffic.messages - before[0],
+        }
+        if one.path is not None:
+            a, b = one.path.history["external_work"], many.path.history["external_work"]
+            found[case]["work"] = float(np.abs(a - b).max() / np.abs(a).max())
+    found["traffic"] = []
+    for height in (80.0, 640.0):  # of the foundation: more unknowns within, the same contacts
+        scene = scenes.flat_punch(2, elements=8, foundation_height=height)
+        problem = contactopt.reduce(spread(scene, team), Q="implicit")
+        problem.Q @ np.ones(len(problem.Q.diagonal))
+        before = (team.traffic.messages, team.traffic.length)
+        problem.Q @ np.ones(len(problem.Q.diagonal))
+        sent = (team.traffic.messages - before[0], team.traffic.length - before[1])
+        found["traffic"].append((*sent, sum(body.unknowns for body in contactopt.reduce_bodies(scene).bodies)))
+    bad = flat(lower=replace(flat().lower, mesh=torn))
+    try:
+        contactopt.run(bad, team=team)
+    except contactopt.InputError as error:
+        found["sentence"] = str(error)
+    print(json.dumps(found))
+finally:
+    team.dismiss()
+"""
+
+
+def environment() -> dict[str, str]:
+    one = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+    return dict(os.environ) | one | {"PYTHONPATH": str(ROOT)}
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    script = tmp_path_factory.mktemp("ranks") / "comparison.py"
+    script.write_text(COMPARISON)
+    command = [*mpiexec(3), sys.executable, str(script)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, env=environment(), cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+CASES = (
+    "explicit", "implicit", "multigrid", "axisymmetric with a zone", "three bodies, mortar", "load path", "slices",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_answers_steps_and_certificates_are_those_of_one_process(found, case):
+    result = found[case]
+    assert result["same"] and result["stress"] == 0.0 and result["messages"] > 0
+    assert result["steps"][0] == result["steps"][1] and result["residuals"][0] == result["residuals"][1] <= 1e-8
+
+
+def test_energies_of_a_load_path_are_those_of_one_process(found):
+    assert found["load path"]["work"] < 1e-12
+
+
+def test_messages_do_not_grow_with_the_unknowns_of_the_bodies(found):
+    """One product with Q is one order to the other body and its reply, whatever lies inside of the body."""
+    (messages, data, unknowns), (others, more, larger) = found["traffic"]
+    assert messages == others == 2 and larger > 1.3 * unknowns
+    assert abs(data - more) < 16 and data < 1500  # two vectors of 34 numbers, and what the order says
+
+
+def test_what_a_rank_raises_is_raised_on_rank_0(found):
+    assert found["sentence"] == "torn on a rank of 3, this is 1."
+
+
+def test_the_command_line_starts_the_ranks_itself(tmp_path, capfd):
+    assert main(["run", "punch-2d", "--elements", "4", "--ranks", "2", "--out", str(tmp_path / "out")]) == 0
+    captured = capfd.readouterr()
+    assert "solved" in captured.out and "2 ranks, " in captured.out
+    assert (tmp_path / "out" / "summary.json").exists()
+
+
+def test_a_mistake_ends_all_ranks_with_its_one_sentence(tmp_path, capfd):
+    code = main(["run", "punch-2d", "--elements", "0", "--ranks", "2", "--out", str(tmp_path / "out")])
+    assert code == main(["run", "punch-2d", "--elements", "0", "--out", str(tmp_path / "out")]) == 2
+    first, second = capfd.readouterr().err.strip().splitlines()
+    assert first == second and first.startswith("contactopt: ")
+
+
+def test_the_death_of_a_rank_ends_all(tmp_path):
+    psutil = pytest.importorskip("psutil")
+    command = [sys.executable, "-m", "contactopt", "run", "punch-3d", "--elements", "14", "--ranks", "2"]
+    started = subprocess.Popen(
+        [*command, "--out", str(tmp_path / "out")], stderr=subprocess.PIPE, text=True, env=environment(), cwd=ROOT
+    )
+
+    def second_rank():
+        for process in psutil.Process(started.pid).children(recursive=True):
+            if "python" in process.name() and process.environ().get("OMPI_COMM_WORLD_RANK") == "1":
+                return process
+        return None
+
+    begin = time.monotonic()
+    while (victim := second_rank()) is None or victim.cpu_times().user < 1.0:  # it is at work
+        assert time.monotonic() - begin < PATIENCE and started.poll() is None
+        time.sleep(0.05)
+    victim.kill()
+    _, errors = started.communicate(timeout=PATIENCE)
+    assert started.returncode == 137 and "contactopt: a rank was ended by signal 9" in errors
+    assert not (tmp_path / "out" / "summary.json").exists()
+
+
+@pytest.mark.parametrize(("dim", "name"), [(2, "foundation"), (3, "punch")])
+def test_slices_tied_to_each_other_are_the_whole_body(dim, name):
+    scene = scenes.flat_punch(dim, elements=8 if dim == 2 else 3)
+    cut = reduce(sliced(scene, name, 3), Q="explicit")
+    whole, pieces = solve(reduce(scene, Q="explicit"), tol=1e-11), solve(cut, tol=1e-11)
+    assert pieces.solved and len(cut.pairs) == 3
+    error = np.abs(pieces.reactions[cut.pairs[0].contacts] - whole.reactions).max()
+    assert error < 1e-9 * np.abs(whole.reactions).max()
+
+
+def test_what_cannot_be_sliced_is_refused():
+    scene = scenes.flat_punch(2, elements=4)
+    with pytest.raises(InputError, match="lies in 2 slices; choose another axis"):
+        sliced(scene, "punch", 2, axis=0)
+    with pytest.raises(InputError, match="no elastic body named 'floor'"):
+        sliced(scene, "floor", 2)
+    with pytest.raises(InputError, match="needs at least 500 layers"):
+        sliced(scene, "punch", 500)

@@ -1,0 +1,213 @@
+"""One sentence instead of a hang, a traceback or a wrong answer: files and arguments that somebody once gave."""
+
+import os
+
+import numpy as np
+import pytest
+
+from contactopt import InputError, InterfaceProblem, fclib, follow, reduce, run, solve
+from contactopt.cli import main
+from contactopt.scenes import flat_punch
+from contactopt.scenes.contact import Contact
+from contactopt.scenes.meshes import rename, tensor_mesh
+from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
+
+PROBLEM = InterfaceProblem(np.eye(2), [[-1.0, 0.2]], 0.3)
+
+
+# Files of other codes
+
+
+def sound(path):
+    fclib.write(PROBLEM, path)
+    return path
+
+
+def test_a_file_that_never_ends_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.hdf5")
+    with pytest.raises(InputError, match=r"pipe\.hdf5"):
+        fclib.read(tmp_path / "pipe.hdf5")
+
+
+def test_nothing_is_read_from_other_files(tmp_path):
+    """A link of the whole problem, of one group, and data that lie outside."""
+    h5py = pytest.importorskip("h5py")
+    sound(tmp_path / "secret.hdf5")
+    with h5py.File(tmp_path / "whole.hdf5", "w") as file:
+        file["fclib_local"] = h5py.ExternalLink("secret.hdf5", "/fclib_local")
+    with h5py.File(sound(tmp_path / "group.hdf5"), "a") as file:
+        del file["fclib_local/W"]
+        file["fclib_local/W"] = h5py.ExternalLink("secret.hdf5", "/fclib_local/W")
+    (tmp_path / "numbers").write_bytes(np.array([-1.0, 0.2]).tobytes())
+    with h5py.File(sound(tmp_path / "data.hdf5"), "a") as file:
+        del file["fclib_local/vectors/q"]
+        outside = [(str(tmp_path / "numbers"), 0, 16)]
+        file["fclib_local/vectors"].create_dataset("q", shape=(2,), dtype=float, external=outside)
+    for name in ("whole", "group", "data"):
+        with pytest.raises(InputError, match="another file"):
+            fclib.read(tmp_path / f"{name}.hdf5")
+
+
+@pytest.mark.parametrize("name", ["W/x", "W/i", "vectors/q", "vectors/mu"])
+def test_sizes_that_a_file_only_declares_take_no_memory(tmp_path, name):
+    """A file of some kilobytes that announces 8 terabytes: a data set without data, which HDF5 reads as zeros."""
+    h5py = pytest.importorskip("h5py")
+    path = sound(tmp_path / "huge.hdf5")
+    with h5py.File(path, "a") as file:
+        kind = file[f"fclib_local/{name}"].dtype
+        del file[f"fclib_local/{name}"]
+        file["fclib_local"].create_dataset(name, shape=(10**12,), dtype=kind, chunks=(1000,))
+    with pytest.raises(InputError, match="announces 1000000000000 numbers"):
+        fclib.read(path)
+
+
+def test_a_problem_is_written_into_a_new_folder_or_not_at_all(tmp_path):
+    fclib.write(PROBLEM, tmp_path / "new" / "a.hdf5")
+    assert fclib.read(tmp_path / "new" / "a.hdf5").fingerprint == PROBLEM.fingerprint
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="file"):
+        fclib.write(PROBLEM, tmp_path / "file" / "a.hdf5")
+
+
+# Scenes
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Support("top", "x"),
+        lambda: Support(3, {"x": 0.0}),
+        lambda: Plate("top", "y"),
+        lambda: Plate("top", ["y"]),
+        lambda: Traction("top", "up"),
+        lambda: Traction("top", (1.0, "x")),
+        lambda: BodyForce("down"),
+    ],
+)
+def test_loads_and_supports_of_the_wrong_type(make):
+    with pytest.raises(InputError):
+        part = flat_punch(2).upper
+        load = make()
+        kind = "supports" if isinstance(load, Support) else "loads"
+        reduce(Scene("s", Part("a", part.mesh, part.material, **{kind: (load,)}), Rigid("floor"), 0.3, elements=4))
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"normal": "up"},
+        {"normal": (0.0, 0.0)},
+        {"normal": (np.nan, 1.0)},
+        {"normal": (0.0, 1.0, 0.0)},
+        {"gap": "wide"},
+        {"gap": lambda x: np.full(x.shape[1] + 1, 0.1)},
+        {"gap": lambda x: np.full(x.shape[1], np.nan)},
+        {"gap": lambda x: None},
+        {"force": 3},
+        {"force": {"y": "heavy"}},
+        {"force": {"q": 1.0}},
+        {"displacement": {"y": np.inf}},
+        {"displacement": 1.0},
+        {"force": {"y": 1.0}, "displacement": {"y": 1.0}},
+    ],
+    ids=str,
+)
+def test_rigid_bodies_of_wrong_fields(fields):
+    scene = flat_punch(2)
+    with pytest.raises(InputError):
+        reduce(Scene("s", scene.upper, Rigid("floor", **fields), 0.3, elements=4))
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"upper": 3},
+        {"lower": "punch"},
+        {"mu": -0.1},
+        {"mu": np.nan},
+        {"mu": "rough"},
+        {"mu": [[0.1], [0.1, 0.2]]},
+        {"mu": np.ones(77)},
+        {"mu": lambda x: "rough"},
+        {"mu": lambda x: -np.ones(x.shape[1])},
+        {"law": "glue"},
+        {"law": 3},
+        {"coupling": "rope"},
+        {"coupling": None},
+        {"carrier": "left"},
+        {"lower": "nobody"},
+        {"lower": "foundation:nowhere"},
+    ],
+    ids=str,
+)
+def test_contacts_of_wrong_fields(fields):
+    scene = flat_punch(2)
+    with pytest.raises(InputError):
+        contact = Contact(**({"upper": "punch", "lower": "foundation", "mu": 0.3} | fields))
+        reduce(Scene("s", bodies=(scene.upper, scene.lower), contacts=(contact,), elements=4))
+
+
+@pytest.mark.parametrize("height", [0.0, -1.0, np.nan], ids=["flat", "turned over", "nowhere"])
+def test_an_element_without_volume_is_refused(height):
+    """One corner of a block is moved so that its element is flat, folds over, or is nowhere."""
+
+    def mesh(elements, zone):
+        made = rename(tensor_mesh(np.linspace(0, 1, 3), np.array([0.0, 1.0])), contact="y-", top="y+")
+        above = np.flatnonzero(made.p[1] == 1.0)
+        made.p[1, above[:2]] = height
+        return made
+
+    part = flat_punch(2).upper
+    bad = Part("a", mesh, part.material, loads=(Plate("top", {"y": -1.0}),))
+    with pytest.raises(InputError):
+        reduce(Scene("s", bad, Rigid("floor"), 0.3, elements=2))
+
+
+def test_too_little_memory_is_one_sentence(monkeypatch, tmp_path, capsys):
+    """Wherever it runs out: the command line says so and leaves nothing behind."""
+
+    def full(*arguments, **settings):
+        raise MemoryError
+
+    monkeypatch.setattr("contactopt.analysis.zone.solve_scene", full)
+    monkeypatch.setattr("contactopt.analysis.solve_scene.reduce_bodies", full)
+    assert main(["run", "punch-2d", "--elements", "4", "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert said.strip().splitlines()[-1].startswith("contactopt: this needs more memory") and "Traceback" not in said
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("elements", [10**9, 10**300, -1, 2.5, "many", np.nan])
+def test_meshes_that_cannot_be(elements):
+    for name in ("punch-2d", "punch-3d", "sphere"):
+        with pytest.raises(InputError):
+            run(name, elements=elements)
+
+
+@pytest.mark.parametrize("choice", [{"Q": "zz"}, {"Q": 3}, {"solver": "zz"}, {"coupling": "zz"}], ids=str)
+def test_choices_that_there_are_not(choice):
+    with pytest.raises(InputError):
+        reduce(flat_punch(2, elements=4), **choice)
+
+
+def test_a_path_of_other_meshes_is_refused():
+    with pytest.raises(InputError):
+        follow([flat_punch(2, elements=4), flat_punch(2, elements=4, width=7.0)])
+
+
+# Loads that no contact can balance
+
+
+@pytest.mark.parametrize("method", ["auto", "lagrangian", "apg", "mprgp", "tresca", "nsgs", "admm", "proximal"])
+@pytest.mark.parametrize("column", [[0.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [1e-300, 0.0]], ids=str)
+def test_a_plate_that_no_contact_can_hold(method, column):
+    """V is zero, moves along the surface of contacts without friction, or pulls: an answer or one sentence."""
+    from contactopt.solving.methods import METHODS
+
+    if method not in METHODS:
+        pytest.skip("no method of that name")
+    problem = InterfaceProblem(np.eye(2), [[0.1, 0.0]], 0.0, np.array(column)[:, None], [-1.0])
+    try:
+        assert not solve(problem, method, max_iterations=50, time_limit=1.0).solved
+    except InputError as error:
+        assert "\n" not in str(error)
