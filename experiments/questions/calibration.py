@@ -152,13 +152,15 @@ Without noise, data from the same grid of 40 points, and data from a finer grid,
 {{clean}}
 
 With normal noise of {NOISE:.0%} of the largest shift, {REPEATS} repetitions. The 95 % intervals should hold the truth about 95 times; a binomial
-count of 100 varies by 2.2:
+count of 100 varies by 2.2. A count below 95 for mu is what a linear interval gives where the model has a kink at every point that begins to
+slip:
 
 {{repetitions}}
 
 Where mu cannot be known: the standard deviation of mu that five states up to the shear T leave, from the Jacobian at the truth. The
 slip zone shrinks with T, and with it what the shift tells of mu. Where no point of the grid slips, mu does not enter at all, and `fit`
-says so (mu = {MU:g}; the figure has other values):
+says so (mu = {MU:g}; the curves of the other values fall on one, because only T / (mu P) counts). The curve goes up and down where points of
+the grid begin to slip one by one:
 
 {{knowledge}}
 
