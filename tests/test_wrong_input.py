@@ -48,6 +48,13 @@ def test_nothing_is_read_from_other_files(tmp_path):
             fclib.read(tmp_path / f"{name}.hdf5")
 
 
+def named(wrong):
+    """The name of a case: the field, and what is wrong in it; functions and arrays have no name that stays the same."""
+    return ", ".join(
+        f"{key} {value if isinstance(value, (int, str)) else type(value).__name__}" for key, value in wrong.items()
+    )
+
+
 @pytest.mark.parametrize("name", ["W/x", "W/i", "vectors/q", "vectors/mu"])
 def test_sizes_that_a_file_only_declares_take_no_memory(tmp_path, name):
     """A file of some kilobytes that announces 8 terabytes: a data set without data, which HDF5 reads as zeros."""
@@ -110,7 +117,7 @@ def test_loads_and_supports_of_the_wrong_type(make):
         {"displacement": 1.0},
         {"force": {"y": 1.0}, "displacement": {"y": 1.0}},
     ],
-    ids=str,
+    ids=named,
 )
 def test_rigid_bodies_of_wrong_fields(fields):
     scene = flat_punch(2)
@@ -138,7 +145,7 @@ def test_rigid_bodies_of_wrong_fields(fields):
         {"lower": "nobody"},
         {"lower": "foundation:nowhere"},
     ],
-    ids=str,
+    ids=named,
 )
 def test_contacts_of_wrong_fields(fields):
     scene = flat_punch(2)

@@ -45,6 +45,7 @@ ROOMS = {
     "material": "The two constants of an elastic material.",
     "files": "Files that are written whole or not at all.",
     "checks": "Checks of the numbers that a user gives.",
+    "cards": "Results in one line for a terminal, and as small tables for notebooks.",
     "errors": "The two exceptions of the package.",
 }
 
