@@ -18,6 +18,7 @@ import numpy as np
 
 from contactopt.analysis.constants import COARSEST, FACTOR, ROUGH
 from contactopt.analysis.progress import progress_lines
+from contactopt.errors import InputError
 from contactopt.interface.reduction import Reduction, reduce_bodies
 from contactopt.problem import Solution
 from contactopt.problem.convolution import Convolution
@@ -103,6 +104,8 @@ def solve_scene(
     InputError : on a scene that cannot be modelled, or options that do not fit
     """
     options = options or Options()
+    if not isinstance(scene, Scene):
+        raise InputError(f"a scene must be a Scene; got {type(scene).__name__}.")
     elements = scene.elements if elements is None else elements
     options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
     reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver)

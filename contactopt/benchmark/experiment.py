@@ -264,10 +264,15 @@ class _Reader:
             words = {
                 key: [key, *(v for v in np.atleast_1d(value) if isinstance(v, str))] for key, value in entry.items()
             }
-            blamed = (
-                k for k, names in words.items() if any(re.search(rf"\b{re.escape(n)}\b", str(error)) for n in names)
-            )
-            culprit = next((key for key in blamed if key != kind), kind)
+            found = {
+                key: [match.start() for name in names if (match := re.search(rf"\b{re.escape(name)}\b", str(error)))]
+                for key, names in words.items()
+                if key != kind
+            }
+            blamed = {
+                key: min(places) for key, places in found.items() if places
+            }  # what a message names first is wrong
+            culprit = min(blamed, key=blamed.__getitem__, default=kind)
             raise self.located(str(error), table, index, culprit) from error
         skipped.append(str(error))
 

@@ -46,5 +46,5 @@ def assemble(scene: Scene, part: Any, elements: int, zone: float | None) -> Asse
             module, function, _ = BODIES[kind]
             made: AssembledBody = getattr(import_module(module), function)(scene, part, elements, zone)
             return made
-    known = ", ".join(kind.__name__ for kind in BODIES)
+    known = ", ".join(kind.__name__ for kind in BODIES if kind is not RemotePart)  # which no user writes
     raise InputError(f"a body of a scene must be one of {known}; got {type(part).__name__}.")
