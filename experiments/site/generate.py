@@ -90,11 +90,15 @@ Every claim is asserted in its code, and the exercises have hidden solutions. [T
 """
 
 
-def notebook(folder: str, name: str, text: str) -> Iterator[tuple[Path, str]]:
-    """A percent script as a page that offers the notebook, and the notebook."""
+# A page that is not executed does not know its language otherwise.
+PYTHON = "# ---\n# jupyter:\n#   language_info:\n#     name: python\n#     pygments_lexer: python\n# ---\n\n"
+
+
+def notebook(folder: str, name: str, text: str, head: str = "") -> Iterator[tuple[Path, str]]:
+    """A percent script as a page that offers the notebook, and the notebook; `head` describes a page that is not executed."""
     title, rest = text.split("\n", 2)[1], text.split("\n", 2)[2]
     offer = f"#\n# {{download}}`Download this page as a notebook <../notebooks/{name}.ipynb>`"
-    yield Path(folder, f"{name}.py"), f"# %% [markdown]\n{title}\n{offer}\n{rest}"
+    yield Path(folder, f"{name}.py"), f"{head}# %% [markdown]\n{title}\n{offer}\n{rest}"
     local = re.sub(r"\]\((\w+)\.py\)", r"](\1.ipynb)", text)  # notebooks of one folder refer to each other
     yield Path("notebooks", f"{name}.ipynb"), jupytext.writes(jupytext.reads(local, "py:percent"), "ipynb")
 
@@ -105,7 +109,7 @@ def course(site: Path) -> Iterator[tuple[Path, str]]:
     for name, text in chapters.items():
         yield from notebook("course", name, without_cells(text, "solution"))
         solved = re.sub(r"^# # (Chapter \d)", r"# # Solutions: \1", without_cells(text, "exercise"), flags=re.M)
-        yield from notebook("course", f"solutions_{name}", solved)
+        yield from notebook("course", f"solutions_{name}", solved, PYTHON)
     pages = [f"course/{name}" for name in chapters] + [f"course/solutions_{name}" for name in chapters]
     yield Path("course.md"), (site / "course.md").read_text() + contents(pages, hidden=False)
 
