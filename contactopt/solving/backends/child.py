@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import weakref
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from math import isfinite
 from threading import Timer
 from typing import Any
@@ -70,8 +72,9 @@ class Child:
         end = Timer(time_left(), process.kill)
         end.start()
         try:
-            pickle.dump((arguments, name, start, settings), process.stdin)
-            process.stdin.flush()
+            with _broken_pipe_is_an_error():
+                pickle.dump((arguments, name, start, settings), process.stdin)
+                process.stdin.flush()
             answer = pickle.load(process.stdout)
         except (OSError, EOFError, pickle.UnpicklingError) as error:
             self.process = None
@@ -84,6 +87,23 @@ class Child:
         if isinstance(answer, str):
             raise BackendError(answer)
         return answer
+
+
+@contextmanager
+def _broken_pipe_is_an_error() -> Iterator[None]:
+    """Writing to a process that was killed raises an exception, as Python has it, also where a library changed that.
+
+    Gmsh, for one, sets the signal of a broken pipe back to its default, which ends the whole process without a word.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGPIPE})
+    try:
+        yield
+    finally:
+        signal.sigtimedwait({signal.SIGPIPE}, 0)
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 
 def _started() -> subprocess.Popen[bytes]:
