@@ -346,7 +346,9 @@ def test_plugins_of_every_bad_kind_get_the_rows_that_they_deserve(tmp_path, monk
     table = run(tmp_path, text)
     assert len(table) == len(read_experiment(written(tmp_path, text)).methods) and table["key"].is_unique
     ends = {name: set(rows["status"]) for name, rows in table.groupby("name")}
-    assert ends == {name: {status} for name, status in ENDS.items()}
+    # Two copies of a process that write at the same time may garble each other's message; the row says so then.
+    assert ends.pop("forks_unseen") <= {ENDS["forks_unseen"], "error"}
+    assert ends == {name: {status} for name, status in ENDS.items() if name != "forks_unseen"}
     assert table["fingerprint"].nunique() == 1 and not (tmp_path / "evil").exists()
     assert (table["success"] == (table["residual"] <= 1e-6)).all()
 
