@@ -210,7 +210,7 @@ class SprungBody(RigidBody):
     def moved(self, T):
         return np.asarray(abs(T).sum(axis=1)).ravel() > 0
 
-    def displacement(self, force, multipliers):
+    def displacement(self, force, multipliers, free=None):
         return force / self.part.k
 
     def energy(self, U):

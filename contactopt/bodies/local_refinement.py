@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import skfem
-from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from contactopt.bodies.elements import is_curved, straight
@@ -51,8 +51,8 @@ def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Curve]) -> Any:
     -------
     A mesh of the same kind with the same named boundaries.
     """
-    logging.getLogger("skfem").setLevel(logging.ERROR)  # it warns that boundaries are lost, which are restored here
-    fine = _named(mesh, mesh.refined(np.asarray(marked)))
+    nameless = replace(mesh, _boundaries=None)  # scikit-fem would warn that it loses the names
+    fine = _named(mesh, nameless.refined(np.asarray(marked)))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
     points = fine.p.copy()
     for name, curve in curves.items():
@@ -114,8 +114,7 @@ def boundary_curve(mesh: Any, name: str) -> Curve | None:
         points, middle = mesh.doflocs, mesh.dofs.facet_dofs[0, facets]
         edges = np.concatenate([[edges[0], middle], [middle, edges[1]]], axis=1)
     pieces = [_Piece(points[:, chain]) for chain in _chains(edges, points)]
-    bent = [piece for piece in pieces if not piece.flat]
-    if not bent:
+    if all(piece.flat for piece in pieces):
         return None
 
     def curve(points: np.ndarray) -> np.ndarray:
@@ -135,10 +134,7 @@ class _Piece:
         turns = np.diff(np.unwrap(np.arctan2(*np.diff(nodes, axis=1)[::-1])))
         self.flat = nodes.shape[1] < 3 or bool(np.all(np.abs(turns) < 1e-9))
         closed = nodes.shape[1] > 3 and np.array_equal(nodes[:, 0], nodes[:, -1])
-        if self.flat:
-            self.line: Any = PchipInterpolator(self.arc, nodes.T) if nodes.shape[1] > 1 else None
-        else:
-            self.line = CubicSpline(self.arc, nodes.T, bc_type="periodic" if closed else "not-a-knot")
+        self.line = CubicSpline(self.arc, nodes.T, bc_type="periodic" if closed else "not-a-knot")
 
     def place(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The places (2, k) on the line for points near it, and how far (k,) these are from the polygon."""

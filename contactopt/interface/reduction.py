@@ -139,8 +139,7 @@ class Reduction:
 
         def displaced(part: tuple[Body, sp.csr_matrix, np.ndarray, Any]) -> np.ndarray:
             body, B, own, X = part
-            force = B.T @ solution.reactions.ravel()
-            return body.displacement(force, own) if X is None else body.displacement(force, own, X)
+            return body.displacement(B.T @ solution.reactions.ravel(), own, X)
 
         return each(displaced, parts, [body.parallel for body in self.bodies])
 

@@ -252,9 +252,8 @@ class _Recorder:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
         r, lam, *known = iterate
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)
-        if (
-            self.lengthless
-        ):  # the same forces solve the problem with u = V lambda = 0, and rounding has no size to vanish beside
+        if self.lengthless:
+            # The same forces solve the problem with u = V lambda = 0, and rounding has no length to be small beside.
             self.multipliers = np.zeros(len(lam))
         begin = time.perf_counter()
         self.residual = self._certificate(known)
