@@ -175,9 +175,21 @@ def _least_displacement(r: np.ndarray, u: np.ndarray) -> float:
 
 
 def balance_residual(problem: InterfaceProblem, reactions: np.ndarray, force: float | None = None) -> float:
-    """Largest relative error of V' r + s = 0: |V_j' r + s_j| / max(|s_j|, max_i |V_ij| F) [-].
+    """Compute the largest relative error of the balance V' r + s = 0: |V_j' r + s_j| / max(|s_j|, max_i |V_ij| F).
 
-    force  F; None: the largest |r_i|
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    reactions
+        (k, dim) contact forces, normal first [force].
+    force
+        The yardstick F [force]; by default the largest |r_i|.
+
+    Returns
+    -------
+    float
+        The error [-]. It is 0 without a balance, and infinite where a resultant that must vanish has no yardstick.
     """
     if len(problem.s) == 0:
         return 0.0
@@ -219,9 +231,21 @@ def siconos_residual(problem: InterfaceProblem, reactions: np.ndarray, multiplie
 
 
 def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray:
-    """The lambda (p,) that fits the reactions best: least squares on the components whose displacement must vanish.
+    """Find the multipliers that fit reactions best, by least squares on the components whose displacement must vanish.
 
-    Those are u_n where r_n > 0 and u_t where |r_t| is below the friction bound. With none, zeros.
+    Those are u_n where r_n > 0 and u_t where |r_t| is below the friction bound.
+
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    reactions
+        (k, dim) contact forces, normal first [force].
+
+    Returns
+    -------
+    ndarray
+        (p,) multipliers lambda; zeros where no displacement must vanish.
     """
     if len(problem.s) == 0:
         return np.zeros(0)

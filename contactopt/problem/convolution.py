@@ -29,7 +29,20 @@ Symbols = dict[tuple[int, int], np.ndarray]  # (a, b) with a <= b -> real array
 
 
 def embedding(grid: tuple[int, ...]) -> tuple[int, ...]:
-    """Sizes M of the padded grid: twice a number that is at least that of the contacts and easy to halve and to transform."""
+    """Choose the size of the padded grid on which a convolution is transformed.
+
+    Each of its sizes is twice a number that is at least that of the contacts and easy to halve and to transform.
+
+    Parameters
+    ----------
+    grid
+        Number of contacts along each of the one or two axes.
+
+    Returns
+    -------
+    tuple
+        Number of points M along each axis.
+    """
     from scipy.fft import next_fast_len
 
     return tuple(2 ** (LEVELS + 1) * int(next_fast_len(-(-n // 2**LEVELS), real=True)) for n in grid)
@@ -180,7 +193,20 @@ def _negated(high: np.ndarray, axis: int, odd: tuple[bool, ...]) -> np.ndarray:
 
 
 def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
-    """Fourier transform of x (*grid), padded by zeros; rows that hold nothing but padding are skipped."""
+    """Transform values on a grid, padded by zeros. Rows that hold nothing but padding are skipped.
+
+    Parameters
+    ----------
+    x
+        (n0[, n1]) real values, in single or double precision.
+    padded
+        Sizes (M0[, M1]) of the padded grid.
+
+    Returns
+    -------
+    ndarray
+        The transform, (M0 / 2 + 1,) in 2D and (M0, M1 / 2 + 1) in 3D, in the precision of x.
+    """
     from scipy.fft import fft, rfft
 
     workers = workers_for(padded)
@@ -191,7 +217,22 @@ def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
 
 
 def backward(spectrum: np.ndarray, padded: tuple[int, ...], grid: tuple[int, ...]) -> np.ndarray:
-    """The part (*grid) of the inverse transform; `spectrum` is overwritten."""
+    """Transform back and keep the part of the grid.
+
+    Parameters
+    ----------
+    spectrum
+        The transform as `forward` gives it. It is overwritten.
+    padded
+        Sizes (M0[, M1]) of the padded grid.
+    grid
+        Number of contacts along each axis.
+
+    Returns
+    -------
+    ndarray
+        (n0[, n1]) real values.
+    """
     from scipy.fft import ifft, irfft
 
     workers = workers_for(padded)

@@ -47,10 +47,23 @@ class Infeasible:
 
 
 def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasible | None:
-    """A proof that the problem has no solution, or None: then it may have one or not.
+    """Look for a proof that a problem has no solution.
 
-    Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not looked at. time_limit [s] bounds the
-    program. A positive definite Q without a plate needs none: every such problem has a solution.
+    Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not looked at. A
+    positive
+    definite Q without a plate needs no search: every such problem has a solution.
+
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    time_limit
+        How long the linear program may take [s].
+
+    Returns
+    -------
+    Infeasible or None
+        The proof. None says nothing: the problem may have a solution or not.
     """
     if (
         not (problem.law.unilateral and problem.law.proportional)

@@ -339,15 +339,23 @@ def loosened(Q: Interface, accuracy: float) -> Interface:
 
 
 def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
-    """Weights w (k,) of the contacts with diag(Q) about proportional to 1 / w^2; the mean of w^2 is one.
+    """Compute weights w of the contacts with diag(Q) about proportional to 1 / w^2.
 
     A force that is spread over the area of a node makes a displacement proportional to 1 / length of the contact line
-    there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area / spacing on a line, sqrt(area) on a surface.
+    there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area / spacing on a line, sqrt(area) on a
+    surface.
 
     Parameters
     ----------
-    chart : the k contacts on their surface [length]
-    areas : (k,) nodal areas
+    chart
+        The places of the k contacts on their surface [length].
+    areas
+        (k,) nodal areas [length^(dim - 1)].
+
+    Returns
+    -------
+    ndarray
+        (k,) positive weights [-]. The mean of w^2 is one.
     """
     if len(chart.places) == 2:
         square = np.sqrt(areas)

@@ -27,12 +27,25 @@ class Scales:
 
 
 def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
-    """The same problem with mean diagonal of Q one, forces of order one and unit columns of V.
+    """Scale a problem so that the mean diagonal of Q is one, forces are of order one and the columns of V have length
+    one.
 
     The force scale is the mean force that the balance asks of a node or, without a balance, the force that removes the
-    root-mean-square overlap at one node; gaps, however wide, do not count. Every change of units of the input gives the same numbers here.
-    A component that cannot move (on a symmetry plane, say) carries no force that matters: a unit compliance there
-    makes that force zero instead of undetermined.
+    root-mean-square overlap at one node. Gaps, however wide, do not count. Every change of units of the input gives the
+    same
+    numbers here. A component that cannot move (on a symmetry plane, say) carries no force that matters: a unit
+    compliance
+    there makes that force zero instead of undetermined.
+
+    Parameters
+    ----------
+    problem
+        The interface problem in its own units.
+
+    Returns
+    -------
+    tuple
+        The dimensionless problem, and the Scales that take its reactions and multipliers back.
     """
     d = diagonal(problem.Q)
     columns = np.linalg.norm(problem.V, axis=0)
@@ -68,7 +81,18 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
 
 
 def immovable(problem: InterfaceProblem) -> np.ndarray:
-    """Mask (k dim,) of the components that neither forces nor multipliers nor q move."""
+    """Find the components that neither forces nor multipliers nor q move.
+
+    Parameters
+    ----------
+    problem
+        The interface problem.
+
+    Returns
+    -------
+    ndarray
+        (k dim,) mask, True where a component cannot move.
+    """
     d = np.abs(diagonal(problem.Q))
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
     still = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)

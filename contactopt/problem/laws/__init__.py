@@ -240,7 +240,23 @@ class Law:
 
 
 def find_law(name: str) -> type[Law]:
-    """The class of the law of that name; InputError if there is none."""
+    """Find the class of a law by its name.
+
+    Parameters
+    ----------
+    name
+        A name in LAWS.
+
+    Returns
+    -------
+    type
+        The subclass of Law.
+
+    Raises
+    ------
+    InputError
+        If there is no law of that name.
+    """
     if not isinstance(name, str) or name not in LAWS:
         raise InputError(f"unknown law {name!r}; choose from {', '.join(LAWS)}.")
     module, cls, _ = LAWS[name]
@@ -249,17 +265,23 @@ def find_law(name: str) -> type[Law]:
 
 
 def make_law(name: str, value: Any, areas: np.ndarray, places: np.ndarray) -> Law:
-    """The law that a scene means at its contacts.
+    """Make the law that a scene means at its contacts.
 
     Parameters
     ----------
     name
         A name in LAWS.
     value
-        What the law reads: a friction coefficient, or for `tresca` a traction bound [stress]. One number, an array (k,),
+        What the law reads: a friction coefficient, or for `tresca` a traction bound [stress]. One number, an array
+        (k,),
         or a function of the places (dim, k) that gives either.
     areas, places
         Nodal areas (k,) and positions (dim, k) of the contacts.
+
+    Returns
+    -------
+    Law
+        The law, with one parameter for each contact.
 
     Raises
     ------
