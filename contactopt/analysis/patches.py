@@ -140,9 +140,21 @@ class Patch:
 
 
 def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> list[Patch]:
-    """The patches of the contacts `inside` (k,), some but not all; none where they are no disc on a surface.
+    """Find the connected patches of a zone on a contact surface.
 
-    weights  (k,) of the contacts in the mean place that is the centre of a disc
+    Parameters
+    ----------
+    problem
+        The interface problem of one pair of surfaces.
+    inside
+        (k,) mask of the contacts of the zone: some of them, but not all.
+    weights
+        (k,) weights of the contacts in the mean place that is the centre of a disc.
+
+    Returns
+    -------
+    list
+        The patches in their order along a contact line. On a surface one patch, or none where the zone is no disc.
     """
     if problem.dim == 3:
         disc = _disc(problem, inside, weights)

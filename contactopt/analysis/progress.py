@@ -16,10 +16,27 @@ PATIENCE = 5.0  # seconds of a solve about which nothing is said
 
 
 def progress_lines(say: Callable[[str], None], problem: InterfaceProblem, tol: float) -> Callable[[int, float], None]:
-    """The `progress` of contactopt.solve that says a line per outer iteration once the solve has taken PATIENCE seconds.
+    """Make a function for the `progress` of contactopt.solve that says a line for each outer iteration.
 
-    A line gives the residual, the V-cycles where the method works on the bodies themselves, the time, the largest memory of
-    the process so far, and the time that is left if the residual goes on falling as it fell in the last iteration.
+    It says nothing before the solve has taken PATIENCE seconds. A line gives the residual, the V-cycles where the
+    method works on
+    the bodies themselves, the time, the largest memory of the process so far, and the time that is left if the residual
+    goes on
+    falling as it fell in the last iteration.
+
+    Parameters
+    ----------
+    say
+        A function that receives each line.
+    problem
+        The interface problem that is solved.
+    tol
+        The residual at which the solve will end.
+
+    Returns
+    -------
+    callable
+        A function of the number of the iteration and of its residual.
     """
     begin = time.perf_counter()
     before: list[tuple[float, float]] = []
@@ -57,7 +74,13 @@ def peak_memory() -> float:
 
 
 def resident_memory() -> float:
-    """Memory of this process now in bytes; 0 where the system does not tell."""
+    """Read how much memory this process takes now.
+
+    Returns
+    -------
+    float
+        Bytes; 0 where the system does not tell.
+    """
     try:
         return float(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
     except OSError:

@@ -30,10 +30,27 @@ class Resultant:
 def resultant(
     points: np.ndarray, forces: np.ndarray, axisymmetric: bool, planes: tuple[SymmetryPlane, ...]
 ) -> Resultant:
-    """Resultant of nodal forces (dim, m) at points (dim, m), those of all mirror images together or of whole rings.
+    """Compute the resultant of nodal forces, those of all mirror images together or of whole rings.
 
-    Mirror images across `planes` and the parts of a ring balance each other but for what acts along the planes and along
+    Mirror images across `planes` and the parts of a ring balance each other but for what acts along the planes and
+    along
     the axis.
+
+    Parameters
+    ----------
+    points
+        (dim, m) where the forces act [length].
+    forces
+        (dim, m) nodal forces, those of all mirror images together or of whole rings [force].
+    axisymmetric
+        Whether the points stand for rings, with components r and z.
+    planes
+        The planes of symmetry.
+
+    Returns
+    -------
+    Resultant
+        The force and its moment about the origin.
     """
     if axisymmetric:
         return Resultant(np.array([0.0, forces[1].sum()]), np.zeros(1))
@@ -47,7 +64,18 @@ def resultant(
 
 
 def planes_of(reduction: Reduction) -> tuple[SymmetryPlane, ...]:
-    """The planes of symmetry of a scene whose bodies are parts of the whole ones; none where they are whole."""
+    """Collect the planes of symmetry of a scene whose bodies are parts of the whole ones.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+
+    Returns
+    -------
+    tuple
+        Its planes, each once; none where the bodies are whole.
+    """
     if reduction.scene.copies == 1:
         return ()
     found: list[SymmetryPlane] = []
@@ -58,7 +86,20 @@ def planes_of(reduction: Reduction) -> tuple[SymmetryPlane, ...]:
 
 
 def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:
-    """Contact forces on the upper bodies in the coordinates of space, (dim, k)."""
+    """Turn the contact forces on the upper bodies into the coordinates of space.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene, with the frames of its k contacts.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    ndarray
+        (dim, k) contact forces [force].
+    """
     return np.asarray(np.einsum("kad,ka->dk", reduction.frames, solution.reactions))
 
 
@@ -84,9 +125,21 @@ def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Res
 
 
 def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Solution]]:
-    """The reduction and solution of every pair by itself, for readers of its surface; the displacements of bodies need all pairs.
+    """Take the reduction and solution of every pair of surfaces by itself, for readers of its surface.
 
-    Where there is one pair only, it is all of the scene.
+    A view has no displacements of the bodies, since these need the forces of all pairs.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    list
+        A reduction and a solution for each pair. Where there is one pair only, they are those of the scene.
     """
     if len(reduction.problem.pairs) == 1:
         return [(reduction, solution)]
@@ -98,7 +151,22 @@ def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Sol
 
 
 def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
-    """`pairs` and `holders` of a summary: resultants, and for pairs forces, pressure and counts of contacts."""
+    """Make the tables `pairs` and `holders` of a summary.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    dict
+        'pairs': for each pair of surfaces its resultant, normal force [force], largest pressure [stress], half-widths
+        [length],
+        coupling and counts of contacts. 'holders': the resultant of each support and plate.
+    """
     pairs = {}
     for (view, own), (name, found) in zip(views(reduction, solution), pair_resultants(reduction, solution).items()):
         problem, r = view.problem, own.reactions

@@ -34,6 +34,23 @@ def arguments_of(texts: list[str]) -> dict[str, Any]:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Solve a scene, write its files and print its numbers.
+
+    Parameters
+    ----------
+    options
+        The options of the command `run`.
+
+    Returns
+    -------
+    int
+        The exit code: 0 if it is solved, to the accuracy asked for, else 1.
+
+    Raises
+    ------
+    InputError
+        If an argument of the scene is given twice, or as `contactopt.run` raises it.
+    """
     from contactopt.runner import run
 
     out = options.out or f"out/{Path(options.scene).stem}"
@@ -115,6 +132,7 @@ def _print_estimate(estimate: Any) -> None:
 
 
 def view(options: argparse.Namespace) -> int:
+    """Write the page of a run and open it in the browser; returns the exit code 0."""
     import webbrowser
 
     from contactopt.figures.page import write_page
@@ -127,6 +145,7 @@ def view(options: argparse.Namespace) -> int:
 
 
 def show(options: argparse.Namespace) -> int:
+    """Print what a scene is: sketch, sizes, arguments and source; returns the exit code 0."""
     from contactopt.figures.sheet import describe
 
     print(describe(options.scene, arguments_of(options.set)))
@@ -134,6 +153,7 @@ def show(options: argparse.Namespace) -> int:
 
 
 def new(options: argparse.Namespace) -> int:
+    """Write an example of a scene file; returns the exit code 0."""
     from contactopt.scenes.example import write_example
 
     write_example(Path(options.file))
@@ -142,6 +162,7 @@ def new(options: argparse.Namespace) -> int:
 
 
 def bench(options: argparse.Namespace) -> int:
+    """Execute the runs of an experiment file and write their report; returns the exit code, 130 if it was interrupted."""
     from contactopt.benchmark.campaign import run_campaign
     from contactopt.benchmark.page import refusals, report_campaign
     from contactopt.benchmark.store import load
@@ -172,6 +193,7 @@ def bench(options: argparse.Namespace) -> int:
 
 
 def report(options: argparse.Namespace) -> int:
+    """Rebuild the reports of benchmarks from their tables; returns the exit code 0."""
     from contactopt.benchmark.campaign import run_reports
     from contactopt.benchmark.page import report_campaign
 
@@ -187,6 +209,7 @@ def report(options: argparse.Namespace) -> int:
 
 
 def listing(options: argparse.Namespace) -> int:
+    """Print everything that can be chosen by its name; returns the exit code 0."""
     from contactopt.cli.lists import print_lists
 
     print_lists()
@@ -194,6 +217,7 @@ def listing(options: argparse.Namespace) -> int:
 
 
 def completion(options: argparse.Namespace) -> int:
+    """Print the completion script of a shell; returns the exit code 0."""
     from contactopt.cli.completion import script
     from contactopt.cli.parser import make_parser
 

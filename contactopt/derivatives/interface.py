@@ -285,7 +285,22 @@ def sensitivity(problem: InterfaceProblem, solution: Solution, distance: float |
 
 
 def slopes(problem: InterfaceProblem, y: np.ndarray) -> np.ndarray:
-    """The derivative D (k, d, d) of the law's map at y; a contact without friction has no tangential force, even at rest."""
+    """Compute the derivative of the law's map at the points of the contacts.
+
+    A contact without friction has no tangential force, even at rest.
+
+    Parameters
+    ----------
+    problem
+        The interface problem, with k contacts in dim dimensions.
+    y
+        (k, dim) points r - rho u, normal first [force].
+
+    Returns
+    -------
+    ndarray
+        (k, dim, dim) derivatives D [-].
+    """
     D = problem.law.project(y)[1].copy()
     D[~problem.law.rough, 1:, :] = 0.0
     return D

@@ -300,7 +300,29 @@ class Coupled:
 
 
 def refined(product: Callable[[Any], Any], solve: Callable[[Any], Any], right: Vector, weights: Vector) -> Any:
-    """x with |W (right - A x)| <= ACCURACY |W right| from solves of what is left; InputError if that is out of reach."""
+    """Solve A x = b to the accuracy ACCURACY by solving again for what is left.
+
+    Parameters
+    ----------
+    product
+        x -> A x.
+    solve
+        b -> an approximate solution x.
+    right
+        The right-hand side b, an array (n,) or a vector in parts.
+    weights
+        Weights W of the rows, like b; the residual is measured by |W (b - A x)| / |W b|.
+
+    Returns
+    -------
+    ndarray or Stacked
+        The solution x.
+
+    Raises
+    ------
+    InputError
+        If the accuracy is out of reach, because the solution is not unique.
+    """
     x, rest = 0.0 * right, right
     size = last = norm(weights * right)
     for _ in range(ROUNDS):

@@ -249,7 +249,22 @@ class Chain:
 
 
 def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
-    """The change of a function of a state along a direction, from what Chain.forward gives."""
+    """Compute the change of a function of a state along a direction.
+
+    Parameters
+    ----------
+    seeds
+        The derivatives of the function by the reactions, multipliers, displacements and slip of the state.
+    moved
+        The changes of the state along the direction, from `Chain.forward`.
+    direction
+        The parameters that change, and by how much.
+
+    Returns
+    -------
+    float
+        The directional derivative, in the unit of the function.
+    """
     total = sum(amount * seeds.explicit(which) for which, amount in direction.items() if not which.is_field)
     for weight, part in (
         (seeds.reactions, moved.change.reactions),
@@ -264,9 +279,25 @@ def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
 
 
 def chain_of(result: Any, distance: float | None = None) -> Chain:
-    """The solved states of a result: of contactopt.run, contactopt.follow, or anything with a reduction and a solution.
+    """Make a chain of the solved states of a result, to differentiate through.
 
-    Raises InputError for anything else, and for a state that is not certified.
+    Parameters
+    ----------
+    result
+        What contactopt.run or contactopt.follow returned, or anything else with a reduction and a solution.
+    distance
+        How near to a kink a contact counts as weakly active, over the largest force [-]; by default as in
+        `sensitivity`.
+
+    Returns
+    -------
+    Chain
+        The states in their order.
+
+    Raises
+    ------
+    InputError
+        For a result without a solved scene, and for a state that is not certified.
     """
     path = result if isinstance(result, PathResult) else getattr(result, "path", None)
     if path is None:
@@ -301,17 +332,31 @@ def solved_chain(
     starts: Sequence[Solution] | None = None,
     Q: str = "auto",
 ) -> Chain:
-    """The certified states of a load path, without their energies; a path of one scene is one state.
+    """Solve the states of a load path, without their energies, and make a chain of them. A path of one scene is one
+    state.
 
     Parameters
     ----------
-    scenes : the states in their order
-    tol : bound on the certificate of every state
-    base : a reduction of the same bodies, which is then only loaded anew
-    starts : a solution for every state, to start from
-    Q : form of Q, as for contactopt.reduce
+    scenes
+        The states in their order.
+    tol
+        Bound on the certificate of every state.
+    base
+        A reduction of the same bodies, which is then only loaded anew.
+    starts
+        A solution for every state, to start from.
+    Q
+        Form of Q, as for contactopt.reduce.
 
-    Raises InputError where a state has no solution or is not solved.
+    Returns
+    -------
+    Chain
+        The certified states in their order.
+
+    Raises
+    ------
+    InputError
+        Where a state has no solution or is not solved.
     """
     steps: list[Step] = []
     before = None

@@ -117,7 +117,23 @@ class Table:
 
 
 def read_table(path: Path) -> Table:
-    """The whole of a TOML file; InputError with the line where it is not TOML."""
+    """Read the whole of a TOML file.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    Table
+        Its table, in which every entry knows its line.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, if it is too long, or, with the line, if it is not TOML.
+    """
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "is no file that can be read" if path.exists() else "does not exist"
         raise InputError(f"scene file '{path}' {what}.")
