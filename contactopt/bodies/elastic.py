@@ -299,7 +299,25 @@ def _trace(weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held
 
 
 def assemble_elastic(scene: Scene, part: Part, elements: int, zone: float | None) -> AssembledElastic:
-    """An elastic Part of a scene on its mesh for `elements` and `zone`."""
+    """Assemble an elastic part of a scene.
+
+    Parameters
+    ----------
+    scene, part
+        The scene and one of its parts.
+    elements, zone
+        Number of elements across the contact half-width, and the half-width that the mesh resolves [length].
+
+    Returns
+    -------
+    AssembledElastic
+        The body as matrices, whose linear system is not solved yet.
+
+    Raises
+    ------
+    InputError
+        For a part that cannot be modelled.
+    """
     return AssembledElastic(build_body(scene, part, elements, zone), part)
 
 

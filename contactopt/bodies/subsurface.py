@@ -23,20 +23,23 @@ PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2)
 
 
 def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]) -> np.ndarray:
-    """Stress tensors below the points of a half-space.
+    """Compute the stress tensors below the points of a half-space.
 
     Parameters
     ----------
     body
         The half-space; not a periodic one.
     force
-        Forces (k, dim) on its points in its components [force].
+        (k, dim) forces on its points in its components [force].
     depths
-        Depths (j,) below the surface [length], at least half a spacing.
+        (j,) depths below the surface [length], at least half a spacing.
 
     Returns
     -------
-    (j, *grid, 3, 3) stresses in the axes of the scene [stress]; in plane strain the third axis is that across the plane.
+    ndarray
+        (j, n0[, n1], 3, 3) stresses in the axes of the scene, for the (n0[, n1]) points of the grid [stress]. In plane
+        strain the
+        third axis is that across the plane.
 
     Raises
     ------
@@ -67,7 +70,18 @@ def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
-    """Von Mises stress (...,) of stress tensors (..., 3, 3)."""
+    """Compute von Mises stresses.
+
+    Parameters
+    ----------
+    stress
+        (..., 3, 3) stress tensors [stress].
+
+    Returns
+    -------
+    ndarray
+        (...) von Mises stresses [stress].
+    """
     deviator = stress - np.trace(stress, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
     return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=(-2, -1))))
 

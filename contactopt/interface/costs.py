@@ -40,7 +40,7 @@ def seconds(way: str, m: int, n: int, dim: int, solver: str) -> float:
 
 
 def form_of(m: int, n: int, dim: int, iterative: bool, solver: str = "superlu") -> str:
-    """The cheaper form of Q, 'explicit' or 'implicit'.
+    """Choose the cheaper form of Q.
 
     Bodies without factors would need m solves for an explicit Q, which never pays.
 
@@ -55,7 +55,12 @@ def form_of(m: int, n: int, dim: int, iterative: bool, solver: str = "superlu") 
     iterative
         Whether a body has no factors.
     solver
-        Of the bodies with factors.
+        Name of the solver of the bodies with factors.
+
+    Returns
+    -------
+    str
+        'explicit' or 'implicit'.
     """
     if iterative or m > MOST_EXPLICIT:
         return "implicit"

@@ -46,7 +46,24 @@ class Integrals:
 
 
 def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
-    """Contacts on the own side and their integrals over the points of the overlap, at least one."""
+    """Integrate the dual functions of one surface over its overlap with another.
+
+    Parameters
+    ----------
+    own
+        The side that carries the contacts, with n points.
+    other
+        The other side, with n' points.
+    points
+        The points of integration of the overlap, at least one.
+
+    Returns
+    -------
+    Integrals
+        The contacts on the own side: nodes (k,), areas (k,), the sparse weights W (k, n) and W' (k, n') whose rows add
+        up to one,
+        and the distances between the surfaces.
+    """
     count = own.cells.shape[1]
     used, cell = np.unique(points.cell, return_inverse=True)
     face, local = used // len(own.cells), used % len(own.cells)
@@ -145,13 +162,41 @@ def _slopes(mass: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray
 
 
 def collect(values: np.ndarray, row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> sp.csr_matrix:
-    """Sparse matrix of values (pair, v, j) in rows (pair, v) and columns (pair, j)."""
+    """Sum values into a sparse matrix.
+
+    Parameters
+    ----------
+    values
+        (pair, v, j) values.
+    row
+        (pair, v) rows.
+    column
+        (pair, j) columns.
+    shape
+        Of the matrix.
+
+    Returns
+    -------
+    csr_matrix
+        The matrix. Values at the same place are added.
+    """
     rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
     return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape)
 
 
 def tidy(W: sp.csr_matrix) -> sp.csr_matrix:
-    """Rounding made zero, and rows made to add up to one exactly, whatever the condition of a sliver."""
+    """Make the rounding in weights zero, and let every row add up to one exactly, whatever the condition of a sliver.
+
+    Parameters
+    ----------
+    W
+        (k, n) weights.
+
+    Returns
+    -------
+    csr_matrix
+        The same weights but for rounding.
+    """
     W = sp.csr_matrix(W)
     W.data[np.abs(W.data) < 1e-14] = 0.0
     W.eliminate_zeros()

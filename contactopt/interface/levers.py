@@ -12,14 +12,24 @@ ROUNDING = 1e-11  # shorter levers, over the size of faces, are rounding
 
 
 def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """The levers l_i (dim, k) [length]: the part of e_i that is no gap, and a share of the gap.
+    """Compute the levers l_i by which displacements are carried: the part of e_i that is no gap, and a share of the
+    gap.
 
     Parameters
     ----------
-    e      (dim, k) vectors from where forces act on the other side to where they act on the own side [length]
-    up     (dim, k) unit normals along which e opens the gap
-    gap    (k,) initial gap [length]
-    sizes  (k,) sizes of the contacts' cells [length]
+    e
+        (dim, k) vectors from where forces act on the other side to where they act on the own side [length].
+    up
+        (dim, k) unit normals along which e opens the gap.
+    gap
+        (k,) initial gap [length].
+    sizes
+        (k,) sizes of the contacts' cells [length].
+
+    Returns
+    -------
+    ndarray
+        (dim, k) levers [length]; zero where they would be rounding alone.
     """
     limit = SHARE * sizes
     lever = e - up * (gap - np.clip(gap, -limit, limit))
@@ -28,10 +38,25 @@ def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) ->
 
 
 def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[list[sp.csr_matrix]]:
-    """Matrices [c][d] (k, n) from displacements d of the own nodes to component c of omega_i x l_i.
+    """Make the matrices from the displacements of a surface to omega_i x l_i at its contacts.
 
-    omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas of the faces. In a plane of
+    omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas of the faces. In a
+    plane of
     symmetry, where the mirror images of these faces count as well, it turns about the normal of the plane alone.
+
+    Parameters
+    ----------
+    lever
+        (dim, k) levers l_i [length].
+    own
+        The surface, with n points.
+    nodes
+        (k,) its points that are contacts.
+
+    Returns
+    -------
+    list
+        Matrices [c][d] (k, n) from the component d of the displacement to the component c of the product.
     """
     f, size = len(own.faces), own.points.shape[1]
     corners = own.points[:, own.faces[:, : own.corners]]

@@ -127,10 +127,26 @@ class Mortar:
 
 
 def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
-    """Contacts between two surfaces.
+    """Find the contacts between two surfaces.
 
-    own  'upper' or 'lower': the body that carries the contacts; None: the one with more contacts where they face each other
-    Raises InputError if the surfaces face each other nowhere.
+    Parameters
+    ----------
+    upper, lower
+        The two surfaces.
+    own
+        'upper' or 'lower': the body that carries the contacts; by default the one with more contacts where they face
+        each
+        other.
+
+    Returns
+    -------
+    Mortar
+        The contacts with areas, normals and gaps, and the weights of the displacements of both sides.
+
+    Raises
+    ------
+    InputError
+        If the surfaces face each other nowhere, or `own` has another value.
     """
     if own not in (None, "upper", "lower"):
         raise InputError(f"the side that carries the contacts must be 'upper', 'lower' or None; got {own!r}.")
@@ -185,7 +201,19 @@ def _contacts(surface: Faces, faces: np.ndarray) -> int:
 
 
 def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
-    """Outward unit normals (dim, n) at contact nodes, from the linear fits on all cells around; sizes (n,) of the cells."""
+    """Compute the outward normals at contact nodes from the linear fits on all cells around them, and the sizes of
+    these cells.
+
+    Parameters
+    ----------
+    surface
+        A surface of n points.
+
+    Returns
+    -------
+    tuple
+        Unit normals (dim, n) and sizes (n,) [length]; both are zero at points that are no contact nodes.
+    """
     n, count = surface.points.shape[1], len(surface.faces)
     total, area = np.zeros(surface.points.shape), np.zeros(n)
     reference, hat = FACES[surface.kind][:2]

@@ -56,9 +56,26 @@ class Overlap:
 
 
 def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
-    """Overlap of two surfaces; `normals` (dim, n) are those of the own side at its nodes.
+    """Find where two surfaces overlap, with points of integration.
 
-    Raises InputError if the other surface is folded, so that some cell faces two of its layers.
+    Parameters
+    ----------
+    own
+        The side that carries the contacts, with n points.
+    other
+        The other side.
+    normals
+        (dim, n) normals of the own side at its points.
+
+    Returns
+    -------
+    Overlap
+        The points on both surfaces, in the order of the own cells.
+
+    Raises
+    ------
+    InputError
+        If the other surface is folded, so that some cell faces two of its layers.
     """
     return _lines(own, other, normals) if own.dim == 2 else _polygons(own, other)
 

@@ -350,7 +350,7 @@ def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
     chart
         The places of the k contacts on their surface [length].
     areas
-        (k,) nodal areas [length^(dim - 1)].
+        (k,) nodal areas [length^2].
 
     Returns
     -------

@@ -252,9 +252,19 @@ def near_neighbours(A: sp.bsr_matrix, points: np.ndarray) -> sp.csr_matrix:
 
 
 def rigid_motions(points: np.ndarray) -> np.ndarray:
-    """Translations and rotations at points (dim, k), as columns (k dim, 3 or 6), the unknowns of a point in a row.
+    """Write the translations and rotations of points as columns, which are the near-kernel of the stiffness.
 
     An axisymmetric body keeps the motions of its section: its hoop strain is small across a few elements.
+
+    Parameters
+    ----------
+    points
+        (dim, k) places [length]. Rotations are scaled by their extent.
+
+    Returns
+    -------
+    ndarray
+        (k dim, 3) in 2D, (k dim, 6) in 3D. The unknowns of a point are consecutive rows.
     """
     dim, k = points.shape
     x = points - points.mean(axis=1, keepdims=True)
@@ -279,12 +289,23 @@ def largest_eigenvalue(A: SparseProduct) -> float:
 def nodal_blocks(
     A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """A in blocks of nodes; its rows are made some at a time, for the copies take more than the result.
+    """Write a matrix in blocks of nodes. Its rows are made some at a time, for the copies take more than the result.
+
+    Parameters
+    ----------
+    A
+        (n, n) sparse matrix, or a block of one.
+    node, component
+        (n,) node and component of each unknown.
+    dim
+        Number of components of a node.
 
     Returns
     -------
-    The (k dim, k dim) matrix of the k nodes present, whose held unknowns are rows of their own; the place (n,) of each
-    unknown of A in it; and the nodes present (k,).
+    tuple
+        The (k dim, k dim) matrix of the k nodes present, whose held unknowns are rows of their own; the place (n,) of
+        each
+        unknown of A in it; and the nodes present (k,).
     """
     present, own = np.unique(node, return_inverse=True)
     place, size = own * dim + component, len(present) * dim
