@@ -38,13 +38,45 @@ class Outcome:
 
 
 def no_answer(status: str, error: object, measured: dict[str, float] | None = None) -> dict[str, Any]:
-    """The message of a run that ended without an answer, in the form of contactopt.benchmark.measure.Answer."""
+    """Write the message of a run that ended without an answer, in the form of contactopt.benchmark.measure.Answer.
+
+    Parameters
+    ----------
+    status
+        How it ended, a word of the column `status`.
+    error
+        What was said, a text or an exception.
+    measured
+        Times and memory, as far as they are known.
+
+    Returns
+    -------
+    dict
+        The fields of Answer.
+    """
     blank = {"reactions": None, "multipliers": None, "label": "", "iterations": np.nan, "seconds": np.nan}
     return {"status": status, "message": one_line(error), "measured": measured or {}, "history": None, **blank}
 
 
 def measure(task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry) -> dict[str, Any]:
-    """Run the method; its answer, or how it failed, in the form of contactopt.benchmark.measure.Answer."""
+    """Run a method on a problem, and measure time and memory.
+
+    Parameters
+    ----------
+    task
+        The run and its limits.
+    problem
+        The interface problem.
+    start
+        The solution to start from, if there is one.
+    plugins
+        The methods of the user.
+
+    Returns
+    -------
+    dict
+        Its answer, or how it failed, in the form of contactopt.benchmark.measure.Answer.
+    """
     random.seed(task.seed)
     np.random.seed(task.seed)  # noqa: NPY002 (a plug-in may use the global generator)
     measured = {"base_mb": reset_peak()}
@@ -96,7 +128,18 @@ def real(values: Any) -> np.ndarray:
 
 
 def call(task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry) -> Outcome:
-    """Run the method; its own errors pass through."""
+    """Run a method on a problem. Its own errors pass through.
+
+    Parameters
+    ----------
+    task, problem, start, plugins
+        As for `measure`.
+
+    Returns
+    -------
+    Outcome
+        The answer of the method, with what it says of itself.
+    """
     spec, tol = task.run.method, None if task.run.setting == "default" else task.run.tolerance
     plugin = None if spec.name in METHODS else plugins.find(spec.name)
     if plugin is None or plugin.iterates:

@@ -96,9 +96,24 @@ def _filter(text: str) -> Any:
 
 
 def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
-    """The experiment in a TOML file, `quick`: with its quick version's keys.
+    """Read an experiment file.
 
-    Raises InputError, naming file and line, on anything that cannot be run.
+    Parameters
+    ----------
+    path
+        The TOML file.
+    quick
+        Whether the keys of its quick version replace the others.
+
+    Returns
+    -------
+    Experiment
+        The problems, methods and settings, checked.
+
+    Raises
+    ------
+    InputError
+        On anything that cannot be run. The message names file and line.
     """
     path = Path(path)
     try:

@@ -100,7 +100,18 @@ def _history(value: Any) -> tuple[list[float], list[float], list[int]] | None:
 
 
 def blank(task: Task) -> dict[str, Any]:
-    """The row of a run of which nothing is known yet but what it is."""
+    """Make the row of a run of which nothing is known yet but what it is.
+
+    Parameters
+    ----------
+    task
+        The run and its limits.
+
+    Returns
+    -------
+    dict
+        A value for every column, with status 'error'.
+    """
     run = task.run
     return {
         "schema": SCHEMA,
@@ -163,9 +174,21 @@ def machine() -> str:
 
 
 def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, Any]:
-    """The part of the row that follows from an answer: certificate and status.
+    """Judge an answer by its certificate. The method's own word counts only where it admits failure.
 
-    The method's own word counts only where it admits failure.
+    Parameters
+    ----------
+    task
+        The run and its limits.
+    problem
+        The interface problem.
+    answer
+        What the method returned.
+
+    Returns
+    -------
+    dict
+        The columns of the row that follow from the answer.
     """
     out: dict[str, Any] = {"message": answer.message, **answer.measured}
     out["time"] = datetime.now(UTC).isoformat(timespec="seconds")

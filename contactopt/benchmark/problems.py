@@ -71,7 +71,18 @@ class ProblemSpec:
 
 
 def short_number(value: Any) -> str:
-    """A float in the fewest characters that give it back; anything else as text."""
+    """Write a float in the fewest characters that give it back, and anything else as text.
+
+    Parameters
+    ----------
+    value
+        Any value.
+
+    Returns
+    -------
+    str
+        The text.
+    """
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
@@ -221,9 +232,28 @@ FAMILIES: dict[str, Callable[..., InterfaceProblem]] = {
 
 
 def named(kind: str, name: str, parameters: Mapping[str, Any], folder: Path) -> list[ProblemSpec]:
-    """The problems behind one entry: one, or every file that an FCLib pattern matches.
+    """Find the problems behind one entry: one, or every file that an FCLib pattern matches.
 
-    Raises InputError if a pattern uses a variable that is not set, or matches nothing.
+    Parameters
+    ----------
+    kind
+        'scene', 'fclib' or 'family'.
+    name
+        The name of the scene or family, or a pattern of files.
+    parameters
+        The arguments of the problem.
+    folder
+        The folder to which a pattern is relative.
+
+    Returns
+    -------
+    list
+        The problems, files in the order of their names.
+
+    Raises
+    ------
+    InputError
+        For an unknown scene, and if a pattern uses a variable that is not set or matches nothing.
     """
     if kind == "scene" and name not in SCENES:
         raise InputError(f"unknown scene {name!r}; choose from {', '.join(SCENES)}.")

@@ -90,7 +90,23 @@ class Layout:
 
 
 def read_layout(path: str | Path) -> Layout:
-    """InputError, naming the file, if it cannot be read or asks for a figure that does not exist."""
+    """Read how the report of an experiment is laid out.
+
+    Parameters
+    ----------
+    path
+        The experiment file.
+
+    Returns
+    -------
+    Layout
+        Title, text, figures and tables of the report.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or asks for a figure that does not exist. The message names it.
+    """
     path = Path(path)
     try:
         data = tomllib.loads(path.read_text())
@@ -122,7 +138,27 @@ def read_layout(path: str | Path) -> Layout:
 
 
 def publish(experiment: str | Path, results: str | Path, reports: str | Path) -> Path:
-    """Take the small table of a campaign over into REPORTS/NAME/rows.csv; returns its path."""
+    """Take the small table of a campaign over into REPORTS/NAME/rows.csv.
+
+    Parameters
+    ----------
+    experiment
+        The experiment file.
+    results
+        The folder of the campaign.
+    reports
+        The folder of the reports.
+
+    Returns
+    -------
+    Path
+        The table.
+
+    Raises
+    ------
+    InputError
+        As `read_layout`, `load` and `save` raise it.
+    """
     layout = read_layout(experiment)
     kept = {"history"} if any(entry["kind"] == "convergence" for entry in layout.figures) else set()
     columns = [*layout.columns] or [name for name in COLUMNS if name not in LEFT_OUT or name in kept]
@@ -132,9 +168,24 @@ def publish(experiment: str | Path, results: str | Path, reports: str | Path) ->
 
 
 def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
-    """Rebuild the report of every experiment that has a table in `reports`, and the page with all; returns its path.
+    """Rebuild the report of every experiment that has a table in `reports`, and the page with all.
 
-    Raises InputError if none has one, or if a figure's arguments do not fit its table.
+    Parameters
+    ----------
+    experiments
+        The experiment files.
+    reports
+        The folder of the reports.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    InputError
+        If none has a table, or if a figure's arguments do not fit its table.
     """
     require("markdown_it", "pandas")
     reports, errors = Path(reports), []
@@ -164,7 +215,27 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
 
 
 def write_report(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
-    """Write report.md with its pictures into a folder; returns its Markdown. InputError if a figure does not fit the table."""
+    """Write report.md with its pictures into a folder.
+
+    Parameters
+    ----------
+    layout
+        How the report is laid out.
+    folder
+        Where it goes.
+    table
+        The rows of the experiment.
+
+    Returns
+    -------
+    str
+        The Markdown of the report.
+
+    Raises
+    ------
+    InputError
+        If a figure does not fit the table.
+    """
     parts = [f"# {one_line(layout.title)}", inert(layout.text.strip())]
     if layout.findings:
         parts.append("\n".join(f"{n}. {inert(text)}" for n, text in enumerate(_findings(layout, table), 1)))
@@ -299,7 +370,22 @@ def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
 
 
 def rendered(text: str, folder: Path) -> str:
-    """Markdown as HTML: pictures of the report embedded, raw HTML shown as text, links only to the web and the page."""
+    """Make HTML of Markdown, with the pictures of the report embedded.
+
+    Raw HTML is shown as text, and links lead only to the web and within the page.
+
+    Parameters
+    ----------
+    text
+        The Markdown.
+    folder
+        Where its pictures are.
+
+    Returns
+    -------
+    str
+        The HTML.
+    """
     from markdown_it import MarkdownIt
 
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")

@@ -97,7 +97,18 @@ _log = logging.getLogger(__name__)
 
 
 def require(*modules: str) -> None:
-    """InputError with what to install if one of the benchmark layer's own dependencies is missing."""
+    """Check that packages of the benchmark layer are installed.
+
+    Parameters
+    ----------
+    modules
+        Names of modules.
+
+    Raises
+    ------
+    InputError
+        If one is missing, with what to install.
+    """
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
         raise InputError(f"benchmarks need {', '.join(missing)}; install with: pip install 'contactopt[benchmark]'")
@@ -203,6 +214,18 @@ def is_row(row: Any) -> bool:
 
 
 def pack(reactions: np.ndarray) -> str:
+    """Write forces as text, in base64.
+
+    Parameters
+    ----------
+    reactions
+        (k, dim) contact forces.
+
+    Returns
+    -------
+    str
+        The text of their bytes.
+    """
     return base64.b64encode(np.ascontiguousarray(reactions, dtype=float).tobytes()).decode()
 
 
@@ -211,10 +234,24 @@ def unpack(text: str) -> np.ndarray:
 
 
 def load(path: str | Path) -> pd.DataFrame:
-    """The table of a campaign: its folder, or a rows.jsonl, .parquet or .csv. One row per run, columns as COLUMNS.
+    """Read the table of a campaign, one row for each run, with the columns COLUMNS.
 
     Parameters of the problem and settings of the method are added as columns problem.NAME and method.NAME.
-    Raises InputError if there is no table, or one of a newer schema.
+
+    Parameters
+    ----------
+    path
+        The folder of the campaign, or a rows.jsonl, .parquet or .csv.
+
+    Returns
+    -------
+    DataFrame
+        The table.
+
+    Raises
+    ------
+    InputError
+        If there is no table, if it cannot be read, or if it has a newer schema.
     """
     require("pandas", "pyarrow")
     import pandas as pd
@@ -274,9 +311,21 @@ def _from_lines(path: Path) -> pd.DataFrame:
 
 
 def save(table: pd.DataFrame, path: str | Path, columns: list[str] | None = None) -> None:
-    """Write a table as .parquet or .csv, complete or not at all; `columns` of COLUMNS, all by default.
+    """Write a table as .parquet or .csv, complete or not at all.
 
-    Raises InputError if it cannot be written, as on a full disk.
+    Parameters
+    ----------
+    table
+        The rows.
+    path
+        The file, whose ending says the format.
+    columns
+        Some of COLUMNS; all by default.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written, as on a full disk.
     """
     path = Path(path)
     chosen = table[[c for c in (columns or COLUMNS) if c in table]]

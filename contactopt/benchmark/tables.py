@@ -17,9 +17,26 @@ SHIFT = 1e-3  # s, of shifted geometric means
 
 
 def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFrame:
-    """The rows of one law whose columns have the given values (a value or a list of them; "": none).
+    """Choose the rows of one law whose columns have given values.
 
-    Raises InputError on an unknown column, or if no row is left.
+    Parameters
+    ----------
+    table
+        The rows.
+    law
+        The law; '' for all.
+    where
+        For a column a value or a list of them; '' stands for no value.
+
+    Returns
+    -------
+    DataFrame
+        The rows that are left, at least one.
+
+    Raises
+    ------
+    InputError
+        On an unknown column, or if no row is left.
     """
     rows = table[table["law"] == law] if law else table
     for column, value in where.items():
@@ -77,7 +94,25 @@ def time_table(
 
 
 def groups(table: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
-    """(name, rows) sorted by name, settings from the loosest to the tightest. InputError if there is no such column."""
+    """Split a table into groups, sorted by name; settings from the loosest to the tightest.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    by
+        The column whose values are the names.
+
+    Returns
+    -------
+    list
+        The name and the rows of each group.
+
+    Raises
+    ------
+    InputError
+        If there is no such column.
+    """
     if by not in table:
         raise InputError(f"the table has no column {by!r}.")
     found = [(str(name), rows) for name, rows in table.groupby(by, sort=True)]

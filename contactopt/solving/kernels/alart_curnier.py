@@ -32,14 +32,46 @@ Step = Callable[[Equations, np.ndarray, np.ndarray, np.ndarray, float], Iterate 
 
 
 def forcing(residual: float, last: float) -> float:
-    """Relative accuracy of the linear system that is worth its price."""
+    """Choose the relative accuracy of the linear system of a Newton step that is worth its price.
+
+    Source: Eisenstat, Walker (1996), Choosing the forcing terms in an inexact Newton method, SIAM J. Sci. Comput. 17,
+    16-32.
+
+    Parameters
+    ----------
+    residual, last
+        The residual of the equations now and before the last step; `last` is infinite before the first step.
+
+    Returns
+    -------
+    float
+        The accuracy, between TIGHTEST and LOOSEST.
+    """
     if last in (0.0, np.inf):
         return FIRST if last else TIGHTEST
     return min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2))
 
 
 def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = None, weight: float = 0.0) -> Equations:
-    """The Alart-Curnier equations of a problem, rho_i = 1 over the mean compliance of contact i."""
+    """Write the Alart-Curnier equations of a problem, with rho_i = 1 over the mean compliance of contact i.
+
+    Source: Alart, Curnier (1991), A mixed formulation for frictional contact problems prone to Newton like solution
+    methods.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem.
+    center
+        (k, dim) forces of a proximal term, if there is one.
+    weight
+        The weight of the proximal term, a compliance.
+
+    Returns
+    -------
+    Equations
+        The equations, which can be evaluated and solved for a Newton step.
+    """
     compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1) + weight
     return Equations(
         problem.Q,
@@ -54,7 +86,19 @@ def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = Non
 
 
 def definite(Q: sp.csr_array) -> bool:
-    """Whether a sparse symmetric Q is safely positive definite, as that of elastic bodies without redundant contacts."""
+    """Say whether a sparse symmetric Q is safely positive definite, as that of elastic bodies without redundant
+    contacts.
+
+    Parameters
+    ----------
+    Q
+        (n, n) sparse matrix.
+
+    Returns
+    -------
+    bool
+        False also where its factorisation fails.
+    """
     try:
         pivots = splu(sp.csc_array(Q), diag_pivot_thresh=0.0, options={"SymmetricMode": True}).U.diagonal()
     except RuntimeError:
@@ -71,7 +115,20 @@ def bonded_factor(problem: InterfaceProblem) -> Bonded | None:
 
 
 def krylov(problem: InterfaceProblem, preconditioner: str | None) -> tuple[Step, Step]:
-    """Newton's steps from products with Q, and those of the bonded solution: the same."""
+    """Make Newton's steps from products with Q, and those of the bonded solution, which are the same.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem.
+    preconditioner
+        A name, as for `model_of`.
+
+    Returns
+    -------
+    tuple
+        Two functions (equations, error, balance, D, rtol) -> step.
+    """
     P = model_of(problem, preconditioner)
 
     def step(equations, error, balance, D, rtol):  # type: ignore[no-untyped-def]
@@ -81,7 +138,18 @@ def krylov(problem: InterfaceProblem, preconditioner: str | None) -> tuple[Step,
 
 
 def dense(problem: InterfaceProblem) -> tuple[Step, Step]:
-    """Newton's steps, and those of the bonded solution."""
+    """Make Newton's steps by factorisations of arrays, and those of the bonded solution.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem with Q an array.
+
+    Returns
+    -------
+    tuple
+        Two functions (equations, error, balance, D, rtol) -> step, or None where the system is singular.
+    """
     factor = bonded_factor(problem)
 
     def steps(ridge: float) -> Step:
@@ -91,7 +159,19 @@ def dense(problem: InterfaceProblem) -> tuple[Step, Step]:
 
 
 def sparse(problem: InterfaceProblem) -> tuple[Step, Step]:
-    """Newton's steps by sparse factors, for many bodies of which each touches few others, and those of the bonded solution."""
+    """Make Newton's steps by sparse factors, for many bodies of which each touches few others, and those of the bonded
+    solution.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem with Q sparse.
+
+    Returns
+    -------
+    tuple
+        Two functions (equations, error, balance, D, rtol) -> step, or None where the system is singular.
+    """
     V = sp.csr_array(problem.V)
 
     def steps(ridge: float) -> Step:
@@ -137,10 +217,24 @@ def newton_step(
 
 
 def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
-    """The bonded solution: all contacts glued if a plate presses the bodies together, else those that would penetrate.
+    """Find the bonded solution, from which Newton's method starts.
 
-    Without a plate no force at all, if its residual is smaller: forces that bond rigid bodies are of any size. On elastic
-    bodies Newton's method cycles from there, because it takes contacts for sliding before friction acts.
+    All contacts are glued if a plate presses the bodies together, else those that would penetrate.
+    Without a plate the start has no force at all, if its residual is smaller: forces that bond rigid bodies are of any
+    size. On
+    elastic bodies Newton's method cycles from there, because it takes contacts for sliding before friction acts.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem.
+    step
+        How the bonded system is solved; by default with factors.
+
+    Returns
+    -------
+    tuple
+        Forces (k, dim) and multipliers (p,).
     """
     zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
     glued = glued_contacts(problem)
@@ -157,12 +251,25 @@ def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
 
 
 def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
-    """Mask (k,) of the contacts that the bonded solution glues.
+    """Choose the contacts that the bonded solution glues.
 
-    Where loads press free bodies together these are all contacts that the loads may close, and otherwise those that would
-    penetrate. One contact i that bears the load F of a pair alone closes once the bodies have approached by q_i + Q_ii F.
-    Further contacts only stiffen the pair. So no contact closes whose gap exceeds the least of these approaches, unless a body turns.
-    All are glued where the near ones alone would leave a motion free.
+    Where loads press free bodies together these are all contacts that the loads may close, and otherwise those that
+    would
+    penetrate. One contact i that bears the load F of a pair alone closes once the bodies have approached by q_i + Q_ii
+    F.
+    Further contacts only stiffen the pair. So no contact closes whose gap exceeds the least of these approaches, unless
+    a body
+    turns. All are glued where the near ones alone would leave a motion free.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem.
+
+    Returns
+    -------
+    ndarray
+        (k,) mask.
     """
     gap = problem.q[:, 0]
     closed = np.asarray((problem.law.lowest < 0) | (gap < 0))
@@ -188,6 +295,19 @@ def _determined(problem: InterfaceProblem, closed: np.ndarray) -> bool:
 
 
 def glued_projection(equations: Equations, glued: np.ndarray) -> Equations:
-    """The equations in which the contacts of the mask (k,) are glued and the others carry no force."""
+    """Write the equations in which some contacts are glued and the others carry no force.
+
+    Parameters
+    ----------
+    equations
+        The equations of contact and friction.
+    glued
+        (k,) mask of the contacts that are glued.
+
+    Returns
+    -------
+    Equations
+        The same equations with another map. They are linear.
+    """
     D = np.where(glued[:, None, None], np.eye(equations.q.shape[1]), 0.0)
     return replace(equations, project=lambda y: (np.where(glued[:, None], y, 0.0), D))

@@ -125,7 +125,24 @@ def coupled_steps(
     preconditioner: str | None,
     start: tuple[np.ndarray, np.ndarray] | None,
 ) -> Iterator[tuple[Known, float]]:
-    """Newton's iterates with the residual of the equations that each step began with; ends where a step fails."""
+    """Iterate Newton's method on the contact equations and the equilibrium of the bodies at once.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem.
+    form
+        Its Q before condensation.
+    preconditioner
+        A name, as for `model_of`.
+    start
+        Forces (k, dim) and multipliers (p,) to start from; None: the bonded solution.
+
+    Yields
+    ------
+    tuple
+        An iterate, and the residual of the equations that its step began with. The iteration ends where a step fails.
+    """
     with one_blas_thread():
         P = fitted(model_of(problem, preconditioner, deflate=False), form)
         coupled = Coupled(coulomb_equations(problem), form, P)
@@ -158,10 +175,23 @@ def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
 
 
 def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
-    """P and its model, scaled so that the eigenvalues of P Q lie about 1 / MARGIN where a random force does most of its work.
+    """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / MARGIN where a random force does most of
+    its work.
 
     One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur complement that is rather
     too large than too small.
+
+    Parameters
+    ----------
+    P
+        The preconditioner, with its model of Q if it has one.
+    form
+        Q before condensation.
+
+    Returns
+    -------
+    Preconditioner
+        P and its model, scaled.
     """
     x = np.random.default_rng(0).normal(size=P.shape[0])
     Qx = form.moved(form.approximate(form.pulled(x)), x)

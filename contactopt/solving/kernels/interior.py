@@ -62,7 +62,24 @@ class Path:
 def interior_iterates(
     problem: InterfaceProblem, matrix: Blocks, path: Path | None = None
 ) -> Iterator[tuple[Iterate, float]]:
-    """Points (r (k, dim), lambda (p,)) in the cones, of a dimensionless problem, and how far each is from a solution."""
+    """Iterate the interior-point method on a dimensionless problem.
+
+    Parameters
+    ----------
+    problem
+        The dimensionless interface problem of k contacts.
+    matrix
+        Its Q, ready for block systems.
+    path
+        How the path to the solution is taken; by default as Path() says.
+
+    Yields
+    ------
+    tuple
+        A point (r (k, dim), lambda (p,)) in the cones, and how far it is from a solution: the largest of the mean
+        complementarity,
+        the error of the law and that of the balance [-].
+    """
     path = path or Path()
     full = path.full
     k, d = problem.q.shape

@@ -38,10 +38,28 @@ Step = tuple[np.ndarray, np.ndarray]  # dr (k, d), dlambda (p,)
 
 
 def model_of(problem: InterfaceProblem, name: str | None = None, deflate: bool = True) -> Preconditioner:
-    """The preconditioner of that name, with the smooth motions deflated if asked for; 'none': the identity.
+    """Make the preconditioner of a problem, with the smooth motions deflated if asked for.
 
-    None: `neumann` where the contacts lie on a grid, `laplacian` on other surfaces whose cells are known, else the identity,
-    with a note that says why.
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    name
+        A name in PRECONDITIONERS, or 'none' for the identity. By default `neumann` where the contacts lie on a grid,
+        `laplacian` on
+        other surfaces whose cells are known, else the identity, with a note that says why.
+    deflate
+        Whether the smooth motions of the bodies are solved for exactly, which costs a few products with Q.
+
+    Returns
+    -------
+    Preconditioner
+        An approximate inverse of Q, on arrays (k dim,).
+
+    Raises
+    ------
+    InputError
+        If the preconditioner that was named is unknown or does not fit the contacts.
     """
     missing: list[str] = []
     for choice in ("neumann", "laplacian") if name is None else (name,) * (name != "none"):
@@ -60,7 +78,28 @@ def model_of(problem: InterfaceProblem, name: str | None = None, deflate: bool =
 def krylov_step(
     equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
 ) -> Step | None:
-    """dr (k, d), dlambda (p,) to that relative accuracy; None if the iteration does not get anywhere."""
+    """Solve for a Newton step from products with Q alone.
+
+    Parameters
+    ----------
+    equations
+        The equations of contact and friction at k contacts in d components.
+    P
+        The preconditioner.
+    error
+        (k, d) right-hand side of the contact equations.
+    balance
+        (p,) error of the balance.
+    D
+        (k, d, d) derivatives of the law's map.
+    rtol
+        Relative accuracy of the step.
+
+    Returns
+    -------
+    tuple or None
+        dr (k, d) and dlambda (p,); None if the iteration does not get anywhere.
+    """
     symmetric = np.array_equal(D, D.transpose(0, 2, 1))
     solve = _symmetric_step if symmetric else _unsymmetric_step
     dr, multipliers = solve(equations, P, error, balance, D, rtol)

@@ -228,7 +228,22 @@ class Evaluation:
 
 
 def step(level: Level, at: Evaluation, rtol: float) -> tuple[Point, int]:
-    """dr (c, k), dlambda (p,) of a Newton step to that relative accuracy, and the iterations that it took."""
+    """Solve for a Newton step on one grid.
+
+    Parameters
+    ----------
+    level
+        The problem on its grid, of c components and k contacts.
+    at
+        The equations at the present point.
+    rtol
+        Relative accuracy of the step.
+
+    Returns
+    -------
+    tuple
+        The step, dr (c, k) and dlambda (p,), and the number of iterations that it took.
+    """
     known = at.error.copy()
     known[:, at.closed] = 0.0
     moved = level.product(known, single=True)[:, at.closed] if np.any(known) else np.zeros((len(known), len(at.closed)))

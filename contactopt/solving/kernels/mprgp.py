@@ -40,7 +40,20 @@ class BoxResult:
 
 
 def largest_eigenvalue(P: np.ndarray, steps: int = 10) -> float:
-    """Estimate from below of the largest eigenvalue of P (n, n), an array or sparse, symmetric positive semidefinite, by power steps."""
+    """Estimate the largest eigenvalue of a symmetric positive semidefinite matrix from below, by power steps.
+
+    Parameters
+    ----------
+    P
+        (n, n) an array or sparse.
+    steps
+        Number of products with P.
+
+    Returns
+    -------
+    float
+        The estimate; 0 for an empty or a zero matrix.
+    """
     n = P.shape[0]
     v = (1 + 0.1 * np.cos(1.0 + np.arange(n))).astype(P.dtype)
     value = 0.0

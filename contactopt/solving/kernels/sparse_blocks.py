@@ -112,7 +112,20 @@ Blocks = DenseBlocks | SparseBlocks
 
 
 def block_matrix(Q: Interface, d: int) -> Blocks:
-    """Q for block systems: sparse where that is faster than LAPACK on an array."""
+    """Prepare Q for block systems: sparse where that is faster than LAPACK on an array.
+
+    Parameters
+    ----------
+    Q
+        (n, n) an array or sparse.
+    d
+        Number of components of a contact.
+
+    Returns
+    -------
+    Blocks
+        The matrix, which solves with other diagonal blocks added.
+    """
     if not sp.issparse(Q):
         return DenseBlocks(Q, d)
     n = Q.shape[0]
@@ -122,7 +135,24 @@ def block_matrix(Q: Interface, d: int) -> Blocks:
 def bordered(
     solve: Solver, right: np.ndarray, V: np.ndarray, left: np.ndarray, balance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """x (m,), lambda (p,) with A x + left lambda = right and V' x = balance; `solve` solves with A. None if not finite."""
+    """Solve A x + left lambda = right and V' x = balance, given a solver with A.
+
+    Parameters
+    ----------
+    solve
+        Solves with A (m, m) for right-hand sides (m, j).
+    right
+        (m,) right-hand side.
+    V, left
+        (m, p) columns of the border.
+    balance
+        (p,) right-hand side of the border.
+
+    Returns
+    -------
+    tuple or None
+        x (m,) and lambda (p,), the latter by least squares where it is not unique. None if a number is not finite.
+    """
     p = len(balance)
     x = solve(np.column_stack([right, left]) if p else right[:, None])
     if not np.all(np.isfinite(x)):

@@ -77,7 +77,20 @@ def complementarity_problem(
 
 
 def lemke(M: np.ndarray, q: np.ndarray) -> np.ndarray | None:
-    """A solution z (m,) of the LCP (M (m, m), q (m,)) by complementary pivots on w - M z - z0 = q; None: a ray."""
+    """Solve a linear complementarity problem by complementary pivots on w - M z - z0 = q.
+
+    Parameters
+    ----------
+    M
+        (m, m) matrix.
+    q
+        (m,) right-hand side.
+
+    Returns
+    -------
+    ndarray or None
+        A solution z (m,) with z >= 0, M z + q >= 0 and z'(M z + q) = 0; None if the pivots end on a ray.
+    """
     m = len(q)
     if np.all(q >= 0):
         return np.zeros(m)
