@@ -64,7 +64,7 @@ def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
     out = Path(out)
     made: list[Path] = []
     try:
-        made = make_folder(out)
+        made = _make_folder(out)
         with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=out) as staging:
             yield Path(staging)
             written = sorted(Path(staging).iterdir())
@@ -74,7 +74,7 @@ def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
     except OSError as error:
         raise _unwritable(out, error) from error
     finally:
-        remove_empty(made)
+        _remove_empty(made)
 
 
 @contextmanager
@@ -126,14 +126,14 @@ def _unwritable(out: Path, error: OSError) -> InputError:
     return InputError(f"cannot write into '{out}': {error.strerror or error}; choose another output directory.")
 
 
-def make_folder(folder: Path) -> list[Path]:
+def _make_folder(folder: Path) -> list[Path]:
     """Make the folder and those above it; the ones that were missing, innermost first, for remove_empty."""
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     return missing
 
 
-def remove_empty(folders: Iterable[Path]) -> None:
+def _remove_empty(folders: Iterable[Path]) -> None:
     """Remove those of the folders that hold nothing."""
     for folder in folders:
         with suppress(OSError):

@@ -178,10 +178,10 @@ def follow(
     if not isinstance(scenes, Iterable) or isinstance(scenes, np.ndarray) or sp.issparse(scenes):
         raise InputError(f"a path is a list of scenes; got {type(scenes).__name__}.")
     method, tol = settings.pop("method", None), settings.pop("tol", 1e-8)
-    return follow_states(scenes, elements, zone, Options(Q, solver, method, tol, settings, note))
+    return _follow_states(scenes, elements, zone, Options(Q, solver, method, tol, settings, note))
 
 
-def follow_states(
+def _follow_states(
     scenes: Iterable[Scene], elements: int | None = None, zone: float | None = None, options: Options | None = None
 ) -> PathResult:
     """As follow(), with the options of contactopt.analysis.solve_scene."""
@@ -228,7 +228,7 @@ def solve_states(
     """
     if len(states) == 1:
         return solve_zone(states[0], elements, options, start)
-    path = follow_states(states, elements, None, options)
+    path = _follow_states(states, elements, None, options)
     return Solved(path.reduction, path.solution, path=path)
 
 

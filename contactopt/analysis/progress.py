@@ -50,7 +50,7 @@ def progress_lines(say: Callable[[str], None], problem: InterfaceProblem, tol: f
             return
         cycles = "" if form is None else f", {form.cycles - first} V-cycles of each body"
         say(
-            f"step {iteration}: residual {residual:.1e}{cycles}, {spent:.0f} s, {peak_memory() / 2**30:.1f} GiB"
+            f"step {iteration}: residual {residual:.1e}{cycles}, {spent:.0f} s, {_peak_memory() / 2**30:.1f} GiB"
             + remaining(before, tol)
         )
 
@@ -67,7 +67,7 @@ def remaining(steps: list[tuple[float, float]], tol: float) -> str:
     return f", about {(end - start) * math.log(new / tol) / math.log(old / new):.0f} s left"
 
 
-def peak_memory() -> float:
+def _peak_memory() -> float:
     """Largest memory of this process so far in bytes."""
     size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return float(size if sys.platform == "darwin" else 1024 * size)

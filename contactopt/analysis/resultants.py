@@ -27,7 +27,7 @@ class Resultant:
         return {"force": self.force.tolist(), "moment": self.moment.tolist()}
 
 
-def resultant(
+def _resultant(
     points: np.ndarray, forces: np.ndarray, axisymmetric: bool, planes: tuple[SymmetryPlane, ...]
 ) -> Resultant:
     """Compute the resultant of nodal forces, those of all mirror images together or of whole rings.
@@ -108,7 +108,7 @@ def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resul
     forces, points = space_forces(reduction, solution), reduction.problem.coordinates
     ring, planes = reduction.scene.kind == "axisymmetric", planes_of(reduction)
     return {
-        pair.name: resultant(points[:, pair.contacts], forces[:, pair.contacts], ring, planes)
+        pair.name: _resultant(points[:, pair.contacts], forces[:, pair.contacts], ring, planes)
         for pair in reduction.problem.pairs
     }
 
@@ -120,7 +120,7 @@ def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Res
     displaced = reduction.displaced(solution)
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
         for name, (points, forces) in body.held_by(U, B.T @ solution.reactions.ravel()).items():
-            found[f"body '{body.name}', {name}"] = resultant(points, forces, ring, planes)
+            found[f"body '{body.name}', {name}"] = _resultant(points, forces, ring, planes)
     return found
 
 

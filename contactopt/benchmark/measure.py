@@ -150,20 +150,20 @@ def blank(task: Task) -> dict[str, Any]:
         "peak_mb": np.nan,
         "base_mb": np.nan,
         "history": "[]",
-        "versions": versions(),
-        "machine": machine(),
+        "versions": _versions(),
+        "machine": _machine(),
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
 
 @cache
-def versions() -> str:
+def _versions() -> str:
     packages = ", ".join(f"{name} {version(name)}" for name in ("contactopt", "numpy", "scipy"))
     return f"Python {platform.python_version()}, {packages}"
 
 
 @cache
-def machine() -> str:
+def _machine() -> str:
     model = platform.processor() or platform.machine()
     try:
         with open("/proc/cpuinfo") as file:

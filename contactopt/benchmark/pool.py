@@ -258,7 +258,7 @@ def run_locally(tasks: Sequence[Task], jobs: int) -> Iterator[dict[str, Any]]:
 _of_thread = threading.local()
 
 
-def run_here(task: Task) -> dict[str, Any]:
+def _run_here(task: Task) -> dict[str, Any]:
     """One run, in a worker process that belongs to the calling thread: what a Dask worker executes."""
     if not hasattr(_of_thread, "worker"):
         _of_thread.worker = Worker()
@@ -302,9 +302,9 @@ def run_on_cluster(tasks: Sequence[Task], address: str) -> Iterator[dict[str, An
         ahead = 4 * max(1, sum(client.nthreads().values()))  # more would only fill the scheduler's memory
         running = as_completed([], raise_errors=False)
         for task in islice(waiting, ahead):
-            running.add(client.submit(run_here, task, pure=False))
+            running.add(client.submit(_run_here, task, pure=False))
         for future in running:
             for task in islice(waiting, 1):
-                running.add(client.submit(run_here, task, pure=False))
+                running.add(client.submit(_run_here, task, pure=False))
             if future.status == "finished":
                 yield future.result()

@@ -236,18 +236,18 @@ def write_report(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
     InputError
         If a figure does not fit the table.
     """
-    parts = [f"# {one_line(layout.title)}", inert(layout.text.strip())]
+    parts = [f"# {_one_line(layout.title)}", _inert(layout.text.strip())]
     if layout.findings:
-        parts.append("\n".join(f"{n}. {inert(text)}" for n, text in enumerate(_findings(layout, table), 1)))
+        parts.append("\n".join(f"{n}. {_inert(text)}" for n, text in enumerate(_findings(layout, table), 1)))
     remove_files(folder, [old.name for old in folder.glob("figure-*.png")])
     for number, entry in enumerate(layout.figures or USUAL, 1):
         result = _drawn(layout, number, entry, table)
         if result is None:
             continue
         if entry["kind"] in TABLES:
-            parts += [markdown(result), f"*Table {number}. {one_line(entry['caption'])}*"]
+            parts += [_markdown(result), f"*Table {number}. {_one_line(entry['caption'])}*"]
         else:
-            picture, caption = folder / f"figure-{number}.png", one_line(entry["caption"])
+            picture, caption = folder / f"figure-{number}.png", _one_line(entry["caption"])
             image = _png(result)
             replace_file(picture, lambda file, image=image: file.write_bytes(image))  # type: ignore[misc]
             parts += [f"![{_plain(caption)}]({picture.name})", f"*Figure {number}. {caption}*"]
@@ -313,36 +313,36 @@ def _foot(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
         f"Made by {again}."
         if kept
         else "Made by `contactopt bench`; rebuilt from the table by `contactopt report` with this folder.",
-        one_line(
+        _one_line(
             f"Environment: {'; '.join(sorted(set(table['machine'])))}. {'; '.join(sorted(set(table['versions'])))}. One BLAS thread."
         ),
     ]
     return "\n".join(lines + ([f"Backends: {', '.join(backends)}."] if backends else []))
 
 
-def markdown(table: pd.DataFrame) -> str:
+def _markdown(table: pd.DataFrame) -> str:
     """A table in Markdown; numbers with three significant digits."""
 
     def text(value: Any) -> str:
-        return f"{value:.3g}" if isinstance(value, float) else literal(str(value))
+        return f"{value:.3g}" if isinstance(value, float) else _literal(str(value))
 
     rows = [[text(v) for v in row] for row in table.itertuples(index=False)]
-    lines = [[literal(str(c)) for c in table.columns], ["---"] * len(table.columns), *rows]
+    lines = [[_literal(str(c)) for c in table.columns], ["---"] * len(table.columns), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def inert(text: object) -> str:
+def _inert(text: object) -> str:
     """Markdown in which raw HTML is text: a `<` that could open a tag is written as an entity."""
     return re.sub(r"<(?=[A-Za-z/!?])", "&lt;", str(text))
 
 
-def one_line(text: object) -> str:
-    return inert(" ".join(str(text).split()))
+def _one_line(text: object) -> str:
+    return _inert(" ".join(str(text).split()))
 
 
-def literal(text: str) -> str:
+def _literal(text: str) -> str:
     """The text in a cell of a table: no HTML, no link, no picture, no end of the cell."""
-    return one_line(text).replace("|", "\\|").replace("](", "]\\(")
+    return _one_line(text).replace("|", "\\|").replace("](", "]\\(")
 
 
 def _png(figure: Any) -> bytes:

@@ -192,7 +192,7 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
                 raise InputError(
                     f"'{path}' was written by a newer version (schema {row['schema']}); update contactopt."
                 )
-            if is_row(row):
+            if _is_row(row):
                 yield row
             else:
                 bad += 1
@@ -200,7 +200,7 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
         _log.warning("'%s': %d lines are no rows of a campaign and are left out", path, bad)
 
 
-def is_row(row: Any) -> bool:
+def _is_row(row: Any) -> bool:
     """Whether it has every column that a run fills, each of its type."""
     if not isinstance(row, dict) or not isinstance(row.get("answer", ""), str):
         return False
@@ -229,7 +229,7 @@ def pack(reactions: np.ndarray) -> str:
     return base64.b64encode(np.ascontiguousarray(reactions, dtype=float).tobytes()).decode()
 
 
-def unpack(text: str) -> np.ndarray:
+def _unpack(text: str) -> np.ndarray:
     return np.frombuffer(base64.b64decode(text))
 
 
@@ -297,12 +297,12 @@ def _from_lines(path: Path) -> pd.DataFrame:
             known = best.get(row["fingerprint"])
             if known is None or row["residual"] < known["residual"]:
                 best[row["fingerprint"]] = row
-    reference = {fingerprint: unpack(row["answer"]) for fingerprint, row in best.items()}
+    reference = {fingerprint: _unpack(row["answer"]) for fingerprint, row in best.items()}
     for row in rows.values():
         answer, row["error"] = row.pop("answer", ""), np.nan
         if answer and row["fingerprint"] in reference:
             exact = reference[row["fingerprint"]]
-            found, size = unpack(answer), float(np.linalg.norm(exact))
+            found, size = _unpack(answer), float(np.linalg.norm(exact))
             if size > 0 and found.shape == exact.shape:
                 row["error"] = float(np.linalg.norm(found - exact)) / size
     types = {"int": "int64", "str": "str", "float": "float64", "bool": "bool"}

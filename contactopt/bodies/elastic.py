@@ -279,7 +279,7 @@ class AssembledElastic:
         raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
 
     def prepare(self, solver: str, entries: bool) -> ElasticBody:
-        return condense(self.body, solver, entries)
+        return _condense(self.body, solver, entries)
 
 
 def _trace(weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray) -> sp.csr_matrix:
@@ -321,7 +321,7 @@ def assemble_elastic(scene: Scene, part: Part, elements: int, zone: float | None
     return AssembledElastic(build_body(scene, part, elements, zone), part)
 
 
-def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> ElasticBody:
+def _condense(body: Assembly, solver: str = "auto", entries: bool = True) -> ElasticBody:
     """Make one body's linear system solvable and condense its plates.
 
     Parameters

@@ -50,7 +50,7 @@ class Motions:
     forces: np.ndarray
 
 
-def rigid_motions(kind: str, components: tuple[str, ...], x: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+def _rigid_motions(kind: str, components: tuple[str, ...], x: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
     """All rigid motions of points x (dim, k) as displacements (dim, k, m), and their names.
 
     Translations have length one; rotations are about the middle of the points and move the furthest of them by one. In
@@ -104,7 +104,7 @@ def free_motions(
         head.
     """
     x = basis.doflocs[:, unknowns[0]]
-    rigid, labels = rigid_motions(kind, components, x)
+    rigid, labels = _rigid_motions(kind, components, x)
     R = np.zeros((basis.N, len(labels)))
     for mode, column in zip(np.moveaxis(rigid, 2, 0), R.T):
         column[unknowns] = mode

@@ -18,7 +18,7 @@ FORCES = {("mm", "MPa"): "N", ("m", "Pa"): "N", ("m", "kPa"): "kN", ("m", "MPa")
 Command = Callable[[argparse.Namespace], int]
 
 
-def arguments_of(texts: list[str]) -> dict[str, Any]:
+def _arguments_of(texts: list[str]) -> dict[str, Any]:
     """The values of NAME=VALUE texts. A value is a number, true, false or a list as in TOML; anything else is a text."""
     found: dict[str, Any] = {}
     for text in texts:
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     out = options.out or f"out/{Path(options.scene).stem}"
     names = ("mu", "force", "degree", "simplices")
     changes = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-    given = arguments_of(options.set)
+    given = _arguments_of(options.set)
     twice = sorted(set(given) & {*changes, *(["elements"] if options.elements is not None else [])})
     if twice:
         raise InputError(f"{twice[0]!r} is given twice, by --set and by --{twice[0]}.")
@@ -148,7 +148,7 @@ def show(options: argparse.Namespace) -> int:
     """Print what a scene is: sketch, sizes, arguments and source; returns the exit code 0."""
     from contactopt.figures.sheet import describe
 
-    print(describe(options.scene, arguments_of(options.set)))
+    print(describe(options.scene, _arguments_of(options.set)))
     return 0
 
 

@@ -221,7 +221,7 @@ class Krylov:
     def __init__(self, tangent: Tangent, P: Preconditioner | None = None):
         self.tangent = tangent
         self.P = model_of(tangent.problem) if P is None else P
-        self.rough = {flag: rough_inverse(tangent, self.P, flag) for flag in (False, True)}
+        self.rough = {flag: _rough_inverse(tangent, self.P, flag) for flag in (False, True)}
 
     def product(self, x: np.ndarray, transposed: bool, act: Act) -> np.ndarray:
         """K x or K' x (n + p,), where act makes the products with Q or its model."""
@@ -252,7 +252,7 @@ class Krylov:
             return self.product(x, transposed, lambda y: Q @ y)
 
         inverse = self.inverse(transposed)
-        return refined(product, lambda rest: _gmres(product, rest, ROUND, inverse), right, np.ones(len(right)))
+        return _refined(product, lambda rest: _gmres(product, rest, ROUND, inverse), right, np.ones(len(right)))
 
 
 class Coupled:
@@ -293,13 +293,13 @@ class Coupled:
         weights = Stacked((*(form.diagonal() ** -0.5).parts, np.concatenate([share, np.ones(len(tangent.problem.s))])))
         none = form.pulled(np.zeros(tangent.problem.q.size))
         whole = Stacked((*none.parts, right))
-        found = refined(
+        found = _refined(
             product, lambda rest: flexible_gmres(product, precondition, rest, weights, ROUND), whole, weights
         )
         return np.asarray(found.parts[-1])
 
 
-def refined(product: Callable[[Any], Any], solve: Callable[[Any], Any], right: Vector, weights: Vector) -> Any:
+def _refined(product: Callable[[Any], Any], solve: Callable[[Any], Any], right: Vector, weights: Vector) -> Any:
     """Solve A x = b to the accuracy ACCURACY by solving again for what is left.
 
     Parameters
@@ -339,7 +339,7 @@ def refined(product: Callable[[Any], Any], solve: Callable[[Any], Any], right: V
     return x
 
 
-def rough_inverse(tangent: Tangent, P: Preconditioner, transposed: bool) -> Act:
+def _rough_inverse(tangent: Tangent, P: Preconditioner, transposed: bool) -> Act:
     """P where a component is held by contact, the identity where it slips, bordered by the balance."""
     closed, d, V = tangent.closed, tangent.D.shape[1], tangent.problem.V[tangent.closed]
     n = len(closed)

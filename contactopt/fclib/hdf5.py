@@ -143,13 +143,13 @@ def _read_global(group: Any) -> InterfaceProblem:
     f = _array(group, "vectors/f").astype(float)
     M = _read_matrix(_item(group, "M"), (len(f), len(f)))
     H = _read_matrix(_item(group, "H"), (len(f), w.size))
-    solve = inverse_of(M)
+    solve = _inverse_of(M)
     W = sp.csr_array(H.T @ solve(H))
     q = H.T @ solve(sp.csr_array(f[:, None])).toarray()[:, 0] + w.ravel()
     return InterfaceProblem(compact(W), q.reshape(-1, dim), mu)
 
 
-def inverse_of(M: sp.csr_array) -> Callable[[sp.csr_array], sp.csr_array]:
+def _inverse_of(M: sp.csr_array) -> Callable[[sp.csr_array], sp.csr_array]:
     """X -> M^-1 X for sparse X. Blocks of rigid bodies are inverted one by one, other matrices are factorised.
 
     RuntimeError or LinAlgError if M is singular.

@@ -48,7 +48,7 @@ def embedding(grid: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(2 ** (LEVELS + 1) * int(next_fast_len(-(-n // 2**LEVELS), real=True)) for n in grid)
 
 
-def odd_axes(a: int, b: int, axes: int) -> tuple[bool, ...]:
+def _odd_axes(a: int, b: int, axes: int) -> tuple[bool, ...]:
     """Along which axes of the grid K_ab is odd."""
     return tuple((a == c + 1) != (b == c + 1) for c in range(axes))
 
@@ -74,7 +74,7 @@ class Kernel:
 
         padded, symbols = embedding(grid), {}
         for (a, b), part in coefficients.items():
-            odd, whole = odd_axes(a, b, len(grid)), part
+            odd, whole = _odd_axes(a, b, len(grid)), part
             for axis, size in enumerate(padded):
                 mirrored = np.flip(np.delete(whole, [0, size // 2], axis), axis)
                 if odd[axis]:
@@ -133,7 +133,7 @@ class Kernel:
         """
         symbols = {}
         for pair, symbol in self.symbols.items():
-            odd = odd_axes(*pair, len(self.grid))
+            odd = _odd_axes(*pair, len(self.grid))
             for axis, size in enumerate(self.padded):
                 last = axis == len(self.padded) - 1
                 count = size // 2 + 1 if last else size
@@ -165,7 +165,7 @@ class Kernel:
                 if pair not in symbols:
                     continue
                 term = symbols[pair] * spectrum
-                if sum(odd_axes(a, b, len(self.grid))) == 1:
+                if sum(_odd_axes(a, b, len(self.grid))) == 1:
                     term *= np.array(1j if a < b else -1j, term.dtype)
                 total = term if total is None else np.add(total, term, out=total)
             if total is not None:
@@ -180,7 +180,7 @@ class Kernel:
         apart = places[:, :, None] - places[:, None, :]
         Q = np.zeros((k, dim, k, dim))
         for (a, b), symbol in self.symbols.items():
-            factor = 1j if sum(odd_axes(a, b, len(self.grid))) == 1 else 1.0
+            factor = 1j if sum(_odd_axes(a, b, len(self.grid))) == 1 else 1.0
             values = backward(factor * symbol, self.padded, self.padded)[tuple(apart)]
             Q[:, a, :, b] = values
             Q[:, b, :, a] = values.T
@@ -209,7 +209,7 @@ def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
     """
     from scipy.fft import fft, rfft
 
-    workers = workers_for(padded)
+    workers = _workers_for(padded)
     spectrum = rfft(x, n=padded[-1], axis=-1, workers=workers)
     if len(padded) == 2:
         spectrum = fft(spectrum, n=padded[0], axis=0, overwrite_x=True, workers=workers)
@@ -235,13 +235,13 @@ def backward(spectrum: np.ndarray, padded: tuple[int, ...], grid: tuple[int, ...
     """
     from scipy.fft import ifft, irfft
 
-    workers = workers_for(padded)
+    workers = _workers_for(padded)
     if len(padded) == 2:
         spectrum = ifft(spectrum, axis=0, overwrite_x=True, workers=workers)[: grid[0]]
     return np.asarray(irfft(spectrum, n=padded[-1], axis=-1, workers=workers))[..., : grid[-1]]
 
 
-def workers_for(padded: tuple[int, ...]) -> int:
+def _workers_for(padded: tuple[int, ...]) -> int:
     """Number of processors for transforms of that size; OMP_NUM_THREADS bounds it."""
     if np.prod(padded) < LARGE:
         return 1

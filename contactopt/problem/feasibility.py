@@ -81,7 +81,7 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasi
     if ray is None:
         return None
     for _ in range(POLISH):
-        if verified(scaled, Q, *ray):
+        if _verified(scaled, Q, *ray):
             weights, motions = ray
             margin = -float(scaled.q[:, 0] @ weights + scaled.s @ motions) * scales.force * scales.length
             told = _sentence(scaled, weights, motions)
@@ -108,7 +108,7 @@ def _without_ridge(problem: InterfaceProblem, Q: sp.csr_array) -> sp.csr_array:
     return sp.csr_array(Q - sp.diags_array(np.where(held, Q.diagonal(), 0.0)))
 
 
-def verified(problem: InterfaceProblem, Q: sp.csr_array, weights: np.ndarray, motions: np.ndarray) -> bool:
+def _verified(problem: InterfaceProblem, Q: sp.csr_array, weights: np.ndarray, motions: np.ndarray) -> bool:
     """Whether (weights, motions) is a ray, with its conditions met to rounding and its margin far above it."""
     k, d = problem.q.shape
     if np.any(weights < 0) or not (np.all(np.isfinite(weights)) and np.all(np.isfinite(motions))):

@@ -136,13 +136,13 @@ class VCycle:
         scale = _inverse_root(blocks.diagonal())
         while points.shape[1] > COARSEST:
             level = SparseProduct(_scaled(blocks, scale, scale), crew)
-            P, modes, points = coarsen(blocks, modes, points)
+            P, modes, points = _coarsen(blocks, modes, points)
             blocks = galerkin(P, blocks, crew)
             coarse = _inverse_root(blocks.diagonal())
             P = _scaled(P, np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0), coarse).tocsr()
             self.levels.append(
                 Level(
-                    level, SINGLE(largest_eigenvalue(level)), SparseProduct(P, crew), SparseProduct(P.T.tocsr(), crew)
+                    level, SINGLE(_largest_eigenvalue(level)), SparseProduct(P, crew), SparseProduct(P.T.tocsr(), crew)
                 )
             )
             scale = coarse
@@ -217,7 +217,7 @@ def _dot(x: np.ndarray, y: np.ndarray) -> float:
     return float(np.einsum("i,i", x, y))
 
 
-def coarsen(A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
+def _coarsen(A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
     """Prolongation from the aggregates of nodes, and the modes and points of the aggregates.
 
     A (n, n) in blocks of nodes;  modes (n, j) it should represent exactly;  points (dim, nodes)
@@ -278,7 +278,7 @@ def rigid_motions(points: np.ndarray) -> np.ndarray:
     return np.stack([c.T.ravel() for c in columns], axis=1)
 
 
-def largest_eigenvalue(A: SparseProduct) -> float:
+def _largest_eigenvalue(A: SparseProduct) -> float:
     """A little more than the largest eigenvalue of a symmetric matrix, by Lanczos' method."""
     n = A.matrix.shape[0]
     start = np.random.default_rng(0).standard_normal(n).astype(A.matrix.dtype)

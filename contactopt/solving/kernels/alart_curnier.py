@@ -106,7 +106,7 @@ def definite(Q: sp.csr_array) -> bool:
     return bool(pivots.min() > SOFTEST**2 * pivots.max())
 
 
-def bonded_factor(problem: InterfaceProblem) -> Bonded | None:
+def _bonded_factor(problem: InterfaceProblem) -> Bonded | None:
     """The factorised bonded system where it pays: elastic bodies pressed together by a plate, Q of full rank."""
     try:
         return Bonded(problem.Q, problem.V) if len(problem.s) else None
@@ -150,10 +150,10 @@ def dense(problem: InterfaceProblem) -> tuple[Step, Step]:
     tuple
         Two functions (equations, error, balance, D, rtol) -> step, or None where the system is singular.
     """
-    factor = bonded_factor(problem)
+    factor = _bonded_factor(problem)
 
     def steps(ridge: float) -> Step:
-        return lambda equations, error, balance, D, rtol: newton_step(equations, factor, error, balance, D, ridge)
+        return lambda equations, error, balance, D, rtol: _newton_step(equations, factor, error, balance, D, ridge)
 
     return steps(RIDGE), steps(GLUE)
 
@@ -175,12 +175,12 @@ def sparse(problem: InterfaceProblem) -> tuple[Step, Step]:
     V = sp.csr_array(problem.V)
 
     def steps(ridge: float) -> Step:
-        return lambda equations, error, balance, D, rtol: sparse_step(equations, V, error, balance, D, ridge)
+        return lambda equations, error, balance, D, rtol: _sparse_step(equations, V, error, balance, D, ridge)
 
     return steps(RIDGE), steps(GLUE)
 
 
-def sparse_step(
+def _sparse_step(
     equations: Equations, V: sp.csr_array, error: np.ndarray, balance: np.ndarray, D: np.ndarray, ridge: float
 ) -> Iterate | None:
     """One step by the factors of [[I - D + D rho (Q + ridge I), D rho V], [V', 0]]; None if it is singular."""
@@ -198,7 +198,7 @@ def sparse_step(
     return (x[:n].reshape(k, d), x[n:]) if np.all(np.isfinite(x)) else None
 
 
-def newton_step(
+def _newton_step(
     equations: Equations,
     factor: Bonded | None,
     error: np.ndarray,

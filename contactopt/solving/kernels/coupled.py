@@ -65,7 +65,7 @@ class Coupled:
     def weights(self) -> Stacked:
         """Weights of the residuals of X, r and the balance: in units of the root of an energy, whatever the mesh."""
         r = np.repeat(self.equations.rho**-0.5, self.equations.q.shape[1])
-        return joined(self.form.diagonal() ** -0.5, r, np.ones(len(self.equations.s)))
+        return _joined(self.form.diagonal() ** -0.5, r, np.ones(len(self.equations.s)))
 
     def linearised(self, at: State) -> tuple[Stacked, Linearised]:
         """The right side of Newton's step there, in parts for X, r and the balance, and its contact equations."""
@@ -74,7 +74,7 @@ class Coupled:
         P, D = equations.project(at.r - equations.rho[:, None] * u)
         balance = equations.V.T @ at.r.ravel() + equations.s
         forces = self.form.unbalanced(at.X, at.r.ravel())
-        return joined(forces, (P - at.r).ravel(), -balance), Linearised(equations, D)
+        return _joined(forces, (P - at.r).ravel(), -balance), Linearised(equations, D)
 
     def size(self, right: Stacked) -> float:
         """The residual that belongs to a right side."""
@@ -87,20 +87,20 @@ class Coupled:
         model = (lambda x: self.P @ x) if self.P.model is None else self.P.model.matvec
 
         def product(x: Stacked) -> Stacked:
-            X, r, multipliers = parted(x)
+            X, r, multipliers = _parted(x)
             forces = form.stiffness(X) - form.pulled(r)
             moved = form.moved(X, r) + V @ multipliers
-            return joined(forces, linearised.rows(r, moved), V.T @ r)
+            return _joined(forces, linearised.rows(r, moved), V.T @ r)
 
         def precondition(x: Stacked) -> Stacked:
-            forces, error, balance = parted(x)
+            forces, error, balance = _parted(x)
             r, multipliers = linearised.solve(model, inverse, error, -balance, INNER)
-            return joined(form.approximate(forces + form.pulled(r)), r, multipliers)
+            return _joined(form.approximate(forces + form.pulled(r)), r, multipliers)
 
         change = flexible_gmres(product, precondition, right, self.weights, rtol)
         if not np.isfinite(norm(change)):
             return None
-        X, r, multipliers = parted(change)
+        X, r, multipliers = _parted(change)
         return State(at.X + X, at.r + r.reshape(at.r.shape), at.multipliers + multipliers)
 
     def judged(self, at: State, error: np.ndarray) -> Known:
@@ -152,7 +152,7 @@ def coupled_steps(
         with one_blas_thread():
             right, linearised = coupled.linearised(at)
             residual = coupled.size(right)
-            known = coupled.judged(at, parted(right)[1].reshape(at.r.shape))
+            known = coupled.judged(at, _parted(right)[1].reshape(at.r.shape))
         yield known, residual
         rtol = min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else FIRST
         with one_blas_thread():
@@ -220,12 +220,12 @@ def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN) -> Sta
     return X
 
 
-def joined(X: Stacked, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
+def _joined(X: Stacked, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
     """One vector of the parts of X, of r (k d,) and of multipliers (p,)."""
     return Stacked((*X.parts, r, multipliers))
 
 
-def parted(x: Stacked) -> tuple[Stacked, np.ndarray, np.ndarray]:
+def _parted(x: Stacked) -> tuple[Stacked, np.ndarray, np.ndarray]:
     """X, r and the multipliers of a joined vector."""
     *X, r, multipliers = x.parts
     return Stacked(tuple(X)), r, multipliers

@@ -27,7 +27,7 @@ from contactopt.solving.deadline import check_time
 RESTART, CYCLES = 40, 3  # of GMRES
 ITERATIONS = 100  # of PCG
 COARSEST = 12  # contacts a side
-FIRST, RATIO = 0.5, 32.0  # of the shifts of `shift_shares`: where they begin to grow, and by how much
+FIRST, RATIO = 0.5, 32.0  # of the shifts of `_shift_shares`: where they begin to grow, and by how much
 
 Point = tuple[np.ndarray, np.ndarray]  # reactions (c, k), multipliers (p,)
 
@@ -361,7 +361,7 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
     values, vectors = np.linalg.eigh(D[:, 1:, 1:])
     values = np.clip(values, 1e-12, 1.0)
     pressed = D[:, 0, 0] > 0
-    shifts, shares = shift_shares((1 - values) / values, rho * level.largest)
+    shifts, shares = _shift_shares((1 - values) / values, rho * level.largest)
 
     def turned(weights: np.ndarray) -> np.ndarray:
         return np.einsum("kab,kb,kcb->kac", vectors, weights, vectors)
@@ -398,7 +398,7 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
     return solve
 
 
-def shift_shares(sigma: np.ndarray, largest: float) -> tuple[np.ndarray, list[np.ndarray]]:
+def _shift_shares(sigma: np.ndarray, largest: float) -> tuple[np.ndarray, list[np.ndarray]]:
     """Shifts from 0 to beyond `largest`, and the share (k, j) that each sigma (k, j) has in each of them.
 
     The shares are hat functions of log(FIRST + sigma); those of sigma beyond the last shift sum to less than one.

@@ -55,13 +55,13 @@ class APG:
 
             prox = lambda y, lam, P=project: project_balanced(P, y, problem.V, problem.s, step, lam)  # noqa: E731
             gradient = lambda y, q=q: (problem.Q @ y.ravel()).reshape(q.shape) + q  # noqa: E731
-            new, lam = accelerate(gradient, prox, r, lam, step, target * max(1.0, float(np.linalg.norm(r))))
+            new, lam = _accelerate(gradient, prox, r, lam, step, target * max(1.0, float(np.linalg.norm(r))))
             change = float(np.linalg.norm(new - r)) / max(1.0, float(np.linalg.norm(new)))
             r, target = new, max(SHARPER * min(change, 1e2 * target), SHARPEST)
             yield r, lam
 
 
-def accelerate(
+def _accelerate(
     gradient: Callable[[np.ndarray], np.ndarray],
     prox: Callable[[np.ndarray, np.ndarray], Iterate],
     r: np.ndarray,
@@ -113,7 +113,7 @@ def disc_qp(
             return u + unit * (single @ change.ravel()).reshape(y.shape).astype(float)  # noqa: B023
 
         before = error
-        t, _ = accelerate(
+        t, _ = _accelerate(
             gradient, lambda y, lam: (disc(y, radius), lam), t, none, step, max(1e-4 * error, 0.3 * tol * size)
         )
     return t, False

@@ -64,9 +64,11 @@ class Nested:
         while levels[-1].halves:
             levels.append(levels[-1].coarse())
         given = None if start is None else (start[0].T[list(levels[0].components)].copy(), start[1])
-        point = robust_start(levels[-1], first_guess(levels, given)) if len(levels) > 1 else first_guess(levels, given)
+        point = (
+            _robust_start(levels[-1], _first_guess(levels, given)) if len(levels) > 1 else _first_guess(levels, given)
+        )
         for coarse, fine in zip(levels[:0:-1], levels[-2::-1]):
-            point, at = solve_level(coarse, point)
+            point, at = _solve_level(coarse, point)
             logger.info("grid %s: residual %.1e", coarse.kernel.grid, at.residual)
             point = fine.refined(point, coarse)
         finest, at, last = levels[0], levels[0].evaluate(*point), np.inf
@@ -75,8 +77,8 @@ class Nested:
             point, at = (given, other) if other.residual < CLOSER * at.residual else (point, at)
         while True:
             if at.residual <= NEAR * max(1.0, float(np.linalg.norm(point[0]))) or at.residual > 0.5 * last:
-                yield (whole(problem, point[0] + at.error), point[1]), at.residual
-            change, count = step(finest, at, worth(at.residual, last))
+                yield (_whole(problem, point[0] + at.error), point[1]), at.residual
+            change, count = step(finest, at, _worth(at.residual, last))
             last = at.residual
             point = point[0] + change[0], point[1] + change[1]
             at = finest.evaluate(*point)
@@ -89,7 +91,7 @@ class Nested:
             )
 
 
-def first_guess(levels: list[Level], given: Point | None) -> Point:
+def _first_guess(levels: list[Level], given: Point | None) -> Point:
     """A point on the coarsest level: the one given, or the forces spread evenly that balance the loads."""
     coarsest = levels[-1]
     if given is not None:
@@ -107,9 +109,9 @@ def first_guess(levels: list[Level], given: Point | None) -> Point:
     return r, lam
 
 
-def robust_start(coarsest: Level, point: Point) -> Point:
+def _robust_start(coarsest: Level, point: Point) -> Point:
     """A solution on the coarsest grid: by Newton's steps, or where they go astray by the default method on an array Q."""
-    reached, at = solve_level(coarsest, point, SURE)
+    reached, at = _solve_level(coarsest, point, SURE)
     if at.residual <= SURE * float(np.linalg.norm(reached[0])) or len(coarsest.components) < coarsest.kernel.dim:
         return reached
     note(logger, "Newton's method failed on the coarsest grid, so the default method starts there from an array Q")
@@ -126,25 +128,25 @@ def robust_start(coarsest: Level, point: Point) -> Point:
     return reached
 
 
-def solve_level(level: Level, point: Point, enough: float = ROUGH) -> tuple[Point, Evaluation]:
+def _solve_level(level: Level, point: Point, enough: float = ROUGH) -> tuple[Point, Evaluation]:
     """Newton's steps on a coarse grid, until the residual is small beside the forces."""
     at, last = level.evaluate(*point), np.inf
     for _ in range(STEPS):
         if at.residual <= enough * float(np.linalg.norm(point[0])):
             break
-        change, _ = step(level, at, worth(at.residual, last))
+        change, _ = step(level, at, _worth(at.residual, last))
         last = at.residual
         point = point[0] + change[0], point[1] + change[1]
         at = level.evaluate(*point)
     return point, at
 
 
-def worth(residual: float, last: float) -> float:
+def _worth(residual: float, last: float) -> float:
     """Relative accuracy of a step: little while the residual does not fall, because the contacts still change."""
     return min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else LOOSEST
 
 
-def whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:
+def _whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:
     """Reactions (k, dim) from the components (c, k) that were solved for."""
     out = np.zeros(problem.q.shape)
     out[:, : len(r)] = r.T

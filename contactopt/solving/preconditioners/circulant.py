@@ -84,8 +84,8 @@ def extended(grid: Grid) -> tuple[GridMap, None]:
     The product of P with arrays (*shape, dim), and None because its inverse is not cheap.
     """
     if grid.closed:
-        symbol, smallest = closed_symbol(*grid.shape)
-        return circular(np.maximum(symbol, smallest / 2)), None
+        symbol, smallest = _closed_symbol(*grid.shape)
+        return _circular(np.maximum(symbol, smallest / 2)), None
     lines = [restricted_circulant(rfft(seminorm(closed_curve(k))).real, k, axis) for axis, k in enumerate(grid.shape)]
     return lambda X: np.sum([line(X) for line in lines], axis=0), None
 
@@ -111,9 +111,9 @@ def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
         raise InputError("preconditioner 'p22' is for contact lines (2D); in 3D choose p21 or neumann.")
     (k,) = grid.shape
     if grid.closed:
-        symbol, smallest = closed_symbol(k)
+        symbol, smallest = _closed_symbol(k)
         symbol = np.maximum(symbol, smallest / 2) / fft(norm(k / 2, 4 / k)).real
-        return circular(1 / symbol), circular(symbol)
+        return _circular(1 / symbol), _circular(symbol)
     m = closed_curve(k)
     symbol = rfft(seminorm(m)).real / rfft(norm(m, 4 / (k - 1))).real
     product, guess = restricted_circulant(symbol, k, 0), extended(grid)[0]
@@ -126,7 +126,7 @@ def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
     return solve, product
 
 
-def closed_symbol(k: int) -> tuple[np.ndarray, float]:
+def _closed_symbol(k: int) -> tuple[np.ndarray, float]:
     """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the smallest of them that is not zero.
 
     A closed curve needs no extension. The eigenvalue of constant functions must be zero. Where k is no power of two, the
@@ -137,7 +137,7 @@ def closed_symbol(k: int) -> tuple[np.ndarray, float]:
     return symbol, float(symbol[1:].min())
 
 
-def circular(symbol: np.ndarray) -> GridMap:
+def _circular(symbol: np.ndarray) -> GridMap:
     """Circulant matrix with that (real, symmetric) symbol (k,) along the first axis."""
     return lambda X: np.asarray(ifft(symbol[:, None] * fft(X, axis=0), axis=0).real)
 

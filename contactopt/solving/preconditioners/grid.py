@@ -41,7 +41,7 @@ class Grid:
         return tuple(len(t) for t in self.ticks)
 
 
-def grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:
+def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:
     """Find the line, closed curve or rectangular grid on which the contacts lie.
 
     The search takes place in the chart, where a rectangular grid may be turned by any angle.
@@ -111,7 +111,7 @@ def on_grid(problem: InterfaceProblem, held: np.ndarray, make: Callable[[Grid], 
     InputError
         If the contacts lie on no grid.
     """
-    grid, order = grid_of(problem, held)
+    grid, order = _grid_of(problem, held)
     product, inverse = make(grid)
 
     def placed(act: GridMap) -> GridMap:

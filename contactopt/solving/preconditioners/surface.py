@@ -83,7 +83,7 @@ def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
         moves = ~held[:, components]
         if moves.any():
             values = np.repeat([mass, shift, share, depth], moves.shape[1], axis=1)
-            made.append((components, moves, factor, square_root(matrix, values, moves.ravel())))
+            made.append((components, moves, factor, _square_root(matrix, values, moves.ravel())))
 
     def product(X: np.ndarray, inverse: bool) -> np.ndarray:
         out = np.zeros(X.shape)
@@ -179,7 +179,7 @@ def _simplices(points: np.ndarray, corners: np.ndarray) -> tuple[list[np.ndarray
     return [-second - third, second, third], np.sqrt(square) / 2
 
 
-def square_root(K: sp.csr_matrix, values: np.ndarray, moves: np.ndarray) -> Root:
+def _square_root(K: sp.csr_matrix, values: np.ndarray, moves: np.ndarray) -> Root:
     """Products with P and with G on the unknowns of the mask `moves` (n,), for K (n, n).
 
     values  (4, n) mass, shift, share and depth of the contact of each unknown
