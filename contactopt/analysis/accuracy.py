@@ -129,8 +129,7 @@ def refine(
     """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
 
     It ends short of the target, with a sentence in the estimate, where the quantity does not converge, where the next
-    mesh
-    would have more than MOST_UNKNOWNS unknowns or take more than MOST_MEMORY bytes, or where a solve fails.
+    mesh would have more than MOST_UNKNOWNS unknowns or take more than MOST_MEMORY bytes, or where a solve fails.
 
     Parameters
     ----------

@@ -35,8 +35,7 @@ def equivalent_half_width(scene: Scene, area: float) -> float:
     ----------
     scene
         Its kind says which: a strip of the scene's thickness in plane strain, a disc in an axisymmetric scene, and a
-        square in
-        space.
+        square in space.
     area
         The contact area [length^2].
 
@@ -57,8 +56,7 @@ def contact_area(scene: Scene, half_width: float) -> float:
     ----------
     scene
         Its kind says which: a strip of the scene's thickness in plane strain, a disc in an axisymmetric scene, and a
-        square in
-        space.
+        square in space.
     half_width
         Half the width of the strip or of the square, or the radius of the disc [length].
 
@@ -77,10 +75,8 @@ def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
 
     Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against x^2 over the outer
     part of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than
-    three nodes
-    are left, and where the other end is a corner, a straight line goes through the rings of nodes next to the edge.
-    Where every
-    node touches, or where contact ends at a corner, the edge is that of the contact surface.
+    three nodes are left, and where the other end is a corner, a straight line goes through the rings of nodes next to
+    the edge. Where every node touches, or where contact ends at a corner, the edge is that of the contact surface.
 
     Parameters
     ----------
@@ -114,13 +110,10 @@ def stick_edge(
     """Read the half-width of the stick zone, with its uncertainty.
 
     The slack of the friction bound counts towards the direction in which the nearest slipping node slips. Where contact
-    ends
-    at a corner, the pressure is singular: the slack relative to its bound stays smooth but not straight. The values
-    nearest
-    to the edge then serve best, and the edge is the mean of what the slack inside and the slip outside read; it is as
-    uncertain as they differ. A reading that is off by more than an element is left out, which happens to the slip of
-    small
-    steps of a load path.
+    ends at a corner, the pressure is singular: the slack relative to its bound stays smooth but not straight. The
+    values nearest to the edge then serve best, and the edge is the mean of what the slack inside and the slip outside
+    read; it is as uncertain as they differ. A reading that is off by more than an element is left out, which happens to
+    the slip of small steps of a load path.
 
     Parameters
     ----------

@@ -103,8 +103,7 @@ def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarr
     """Compute the stiffness of the present contacts against relative motions of the bodies.
 
     It is made of the forces that a small motion adds if no contact opens, closes or changes between stick and slip.
-    Contacts
-    that slip take part with their normal components.
+    Contacts that slip take part with their normal components.
 
     Parameters
     ----------

@@ -19,10 +19,8 @@ def progress_lines(say: Callable[[str], None], problem: InterfaceProblem, tol: f
     """Make a function for the `progress` of contactopt.solve that says a line for each outer iteration.
 
     It says nothing before the solve has taken PATIENCE seconds. A line gives the residual, the V-cycles where the
-    method works on
-    the bodies themselves, the time, the largest memory of the process so far, and the time that is left if the residual
-    goes on
-    falling as it fell in the last iteration.
+    method works on the bodies themselves, the time, the largest memory of the process so far, and the time that is left
+    if the residual goes on falling as it fell in the last iteration.
 
     Parameters
     ----------

@@ -164,8 +164,7 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
     -------
     dict
         'pairs': for each pair of surfaces its resultant, normal force [force], largest pressure [stress], half-widths
-        [length],
-        coupling and counts of contacts. 'holders': the resultant of each support and plate.
+        [length], coupling and counts of contacts. 'holders': the resultant of each support and plate.
     """
     pairs = {}
     for (view, own), (name, found) in zip(views(reduction, solution), pair_resultants(reduction, solution).items()):

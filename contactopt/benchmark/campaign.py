@@ -61,8 +61,7 @@ def run_campaign(
     ------
     InputError
         On an experiment that cannot be run, filters that no run matches, results in the folder without `resume`, and a
-        folder
-        that cannot be written to.
+        folder that cannot be written to.
     """
     require("pandas", "pyarrow", "tqdm")
     if not isinstance(experiment, Experiment):
@@ -113,8 +112,7 @@ def run_reports(
         The folder of the reports, with the table of each.
     version
         '': solve nothing. 'full': run the experiments first and renew their tables in `reports`. 'quick': run their
-        quick
-        versions, with tables and reports in out/quick, so that `reports` stays as it is.
+        quick versions, with tables and reports in out/quick, so that `reports` stays as it is.
     names
         Stems of the experiment files to run; all by default.
     jobs, quiet

@@ -29,8 +29,7 @@ def subfolder(parent: Path, name: str) -> Path:
     ------
     InputError
         If the name can lead out of `parent`, or if it is a symbolic link there: the folder behind a link was not given
-        by the
-        user, so nothing is written or removed in it.
+        by the user, so nothing is written or removed in it.
     """
     check_name("the name", name)
     folder = parent / name

@@ -78,10 +78,9 @@ def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -
     The declaration counts where a campaign runs the file. Everywhere else the function or class is returned as it is.
 
     A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s], `max_iterations` and
-    `start`
-    (a Solution or None) are passed if it has such arguments, `tol` not at the setting "default" if it has a default. It
-    returns reactions (k, dim), or (reactions, multipliers), or a Solution. Returning claims success; raising
-    does not, and InputError means that the problem is not one for this method.
+    `start` (a Solution or None) are passed if it has such arguments, `tol` not at the setting "default" if it has a
+    default. It returns reactions (k, dim), or (reactions, multipliers), or a Solution. Returning claims success;
+    raising does not, and InputError means that the problem is not one for this method.
 
     Parameters
     ----------

@@ -269,8 +269,7 @@ def run_on_cluster(tasks: Sequence[Task], address: str) -> Iterator[dict[str, An
     """Execute runs by a Dask cluster.
 
     Each thread of each Dask worker keeps a worker process of its own. Plug-in and FCLib files must be found under the
-    same
-    paths there. A run whose Dask worker is lost leaves no row: resume the campaign.
+    same paths there. A run whose Dask worker is lost leaves no row: resume the campaign.
 
     Parameters
     ----------

@@ -59,8 +59,7 @@ def short_label(name: str, labels: Mapping[str, str] = MappingProxyType({})) -> 
     """Shorten the label of a line.
 
     It is the label that was given for a name; else the name itself, where it is long with the values of its settings
-    only.
-    normal_qp(backend='clarabel', exact=True) becomes 'normal_qp clarabel exact'.
+    only. normal_qp(backend='clarabel', exact=True) becomes 'normal_qp clarabel exact'.
 
     Parameters
     ----------

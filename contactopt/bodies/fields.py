@@ -102,12 +102,9 @@ def recovery_error(body: Assembly, U: np.ndarray, W: np.ndarray) -> np.ndarray:
     """Estimate for every element how much it adds to the error of the energy, or of another functional.
 
     For every element this is the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)). s is the stress of a displacement
-    and s* the
-    continuous stress with its averages at the vertices, which is more accurate where the solution is smooth. With W = U
-    it is
-    twice the energy of the estimated error in each element; with W the displacement of an adjoint problem it is what
-    the element
-    adds to the error of that problem's functional.
+    and s* the continuous stress with its averages at the vertices, which is more accurate where the solution is smooth.
+    With W = U it is twice the energy of the estimated error in each element; with W the displacement of an adjoint
+    problem it is what the element adds to the error of that problem's functional.
 
     Source: Zienkiewicz, Zhu (1987), A simple error estimator and adaptive procedure for practical engineering analysis.
 

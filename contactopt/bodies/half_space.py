@@ -305,8 +305,7 @@ def assemble_half_space(scene: Scene, part: HalfSpace, elements: int, zone: floa
         The scene and one of its half-spaces.
     elements, zone
         Number of points across the contact half-width, and the half-width that the grid resolves [length], for grids
-        that
-        depend on them.
+        that depend on them.
 
     Returns
     -------

@@ -38,8 +38,7 @@ def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]
     -------
     ndarray
         (j, n0[, n1], 3, 3) stresses in the axes of the scene, for the (n0[, n1]) points of the grid [stress]. In plane
-        strain the
-        third axis is that across the plane.
+        strain the third axis is that across the plane.
 
     Raises
     ------

@@ -102,8 +102,7 @@ def write(problem: InterfaceProblem, path: str | Path, title: str = "", descript
     ------
     InputError
         On other laws than Coulomb's, which FCLib cannot express; on a Q that is known by its products only; on a folder
-        that
-        cannot be written to; and where h5py is not installed.
+        that cannot be written to; and where h5py is not installed.
     """
     if not isinstance(problem, InterfaceProblem):
         raise InputError(f"what is written must be an InterfaceProblem; got {type(problem).__name__}.")

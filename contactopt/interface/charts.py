@@ -59,8 +59,7 @@ def lay_out(contacts: ContactPoints, copies: int, axisymmetric: bool) -> tuple[C
     """Lay out the chart and the local frames of a contact surface.
 
     Contacts are ordered along the contact line, or row by row of the tangent chart. In 2D t1 is n turned clockwise. In
-    3D
-    it is the first direction of the chart, made orthogonal to n.
+    3D it is the first direction of the chart, made orthogonal to n.
 
     Parameters
     ----------

@@ -87,8 +87,7 @@ def couple(
         Its bodies.
     kind
         A name in COUPLINGS, or 'auto'; by default that of the pair. 'auto' is matching nodes where they match, or where
-        a
-        body has no mesh, and otherwise mortar.
+        a body has no mesh, and otherwise mortar.
 
     Returns
     -------

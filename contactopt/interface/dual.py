@@ -61,8 +61,7 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
     -------
     Integrals
         The contacts on the own side: nodes (k,), areas (k,), the sparse weights W (k, n) and W' (k, n') whose rows add
-        up to one,
-        and the distances between the surfaces.
+        up to one, and the distances between the surfaces.
     """
     count = own.cells.shape[1]
     used, cell = np.unique(points.cell, return_inverse=True)

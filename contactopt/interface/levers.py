@@ -41,8 +41,8 @@ def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[li
     """Make the matrices from the displacements of a surface to omega_i x l_i at its contacts.
 
     omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas of the faces. In a
-    plane of
-    symmetry, where the mirror images of these faces count as well, it turns about the normal of the plane alone.
+    plane of symmetry, where the mirror images of these faces count as well, it turns about the normal of the plane
+    alone.
 
     Parameters
     ----------

@@ -135,8 +135,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
         The two surfaces.
     own
         'upper' or 'lower': the body that carries the contacts; by default the one with more contacts where they face
-        each
-        other.
+        each other.
 
     Returns
     -------

@@ -47,8 +47,7 @@ def escape(problem: InterfaceProblem) -> Escape | None:
     """Look for a motion along which the loads drive the bodies away from all contacts.
 
     Looked at are laws under which contacts can only push. Under laws whose friction is no cone, only motions count that
-    do
-    not slide where there is friction.
+    do not slide where there is friction.
 
     Parameters
     ----------

@@ -50,8 +50,7 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasi
     """Look for a proof that a problem has no solution.
 
     Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not looked at. A
-    positive
-    definite Q without a plate needs no search: every such problem has a solution.
+    positive definite Q without a plate needs no search: every such problem has a solution.
 
     Parameters
     ----------

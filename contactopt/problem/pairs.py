@@ -79,8 +79,7 @@ def alone(problem: InterfaceProblem, solution: Solution, pair: Pair) -> tuple[In
 
     The displacements of the pair are the same functions of its own forces, and the loads are those that the solution's
     forces on the pair balance. A solution of the whole problem therefore gives one of this problem. Where there is one
-    pair
-    only, both are returned as they are.
+    pair only, both are returned as they are.
 
     Parameters
     ----------

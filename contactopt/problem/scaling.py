@@ -32,10 +32,8 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
 
     The force scale is the mean force that the balance asks of a node or, without a balance, the force that removes the
     root-mean-square overlap at one node. Gaps, however wide, do not count. Every change of units of the input gives the
-    same
-    numbers here. A component that cannot move (on a symmetry plane, say) carries no force that matters: a unit
-    compliance
-    there makes that force zero instead of undetermined.
+    same numbers here. A component that cannot move (on a symmetry plane, say) carries no force that matters: a unit
+    compliance there makes that force zero instead of undetermined.
 
     Parameters
     ----------

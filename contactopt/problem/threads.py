@@ -27,8 +27,7 @@ def one_blas_thread() -> Iterator[None]:
     """Let BLAS use one thread inside the block.
 
     It is for work with many small dense products, between which further threads would only spin. The limit holds for
-    the
-    whole process, so that one thread alone may set it at a time.
+    the whole process, so that one thread alone may set it at a time.
 
     Yields
     ------

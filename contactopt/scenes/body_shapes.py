@@ -26,8 +26,7 @@ def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], len
         The table of the body in a scene file.
     folder
         The folder to which names of mesh files are relative. Without one no mesh is made, and the entries are only
-        marked as
-        known.
+        marked as known.
     components
         Names of the components of the scene, such as ('x', 'y').
     length

@@ -102,8 +102,7 @@ def name_boundaries(mesh: skfem.Mesh, places: Mapping[str, Mapping[int, tuple[fl
         Any mesh.
     places
         Name -> {axis: (least, largest coordinate)}: the facets of the surface whose corners all lie within these
-        limits, to
-        a millionth of the size of the body.
+        limits, to a millionth of the size of the body.
 
     Returns
     -------

@@ -30,14 +30,11 @@ def self_affine(
     """Draw heights of a periodic self-affine rough surface from a seed.
 
     The heights are Gaussian. Their power spectrum falls with the wave number k as k^(-2 (1 + hurst)) between the
-    wavelengths
-    `roll_off` and `shortest`, is constant from `longest` to `roll_off`, and zero beyond. The same seed gives the same
-    waves on
-    every grid that resolves `shortest`.
+    wavelengths `roll_off` and `shortest`, is constant from `longest` to `roll_off`, and zero beyond. The same seed
+    gives the same waves on every grid that resolves `shortest`.
 
     Source: Persson et al. (2005), On the nature of surface roughness with application to contact mechanics, J. Phys.:
-    Condens.
-    Matter 17, R1-R62.
+    Condens. Matter 17, R1-R62.
 
     Parameters
     ----------
@@ -127,9 +124,8 @@ def read_surface(path: str | Path) -> tuple[np.ndarray, tuple[float, float] | No
     """Read a measured rough surface from a file.
 
     A `.npy` file and a table of numbers in text (`.txt`, `.csv`, `.asc`, `.dat`) hold the heights alone, with x along
-    the rows.
-    Files of instruments are read by the package surfalize, if it is installed; their heights and lengths are in
-    micrometres.
+    the rows. Files of instruments are read by the package surfalize, if it is installed; their heights and lengths are
+    in micrometres.
 
     Parameters
     ----------

@@ -304,8 +304,7 @@ def nodal_blocks(
     -------
     tuple
         The (k dim, k dim) matrix of the k nodes present, whose held unknowns are rows of their own; the place (n,) of
-        each
-        unknown of A in it; and the nodes present (k,).
+        each unknown of A in it; and the nodes present (k,).
     """
     present, own = np.unique(node, return_inverse=True)
     place, size = own * dim + component, len(present) * dim

@@ -273,8 +273,7 @@ def make_law(name: str, value: Any, areas: np.ndarray, places: np.ndarray) -> La
         A name in LAWS.
     value
         What the law reads: a friction coefficient, or for `tresca` a traction bound [stress]. One number, an array
-        (k,),
-        or a function of the places (dim, k) that gives either.
+        (k,), or a function of the places (dim, k) that gives either.
     areas, places
         Nodal areas (k,) and positions (dim, k) of the contacts.
 

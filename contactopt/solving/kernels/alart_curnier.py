@@ -219,10 +219,9 @@ def _newton_step(
 def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
     """Find the bonded solution, from which Newton's method starts.
 
-    All contacts are glued if a plate presses the bodies together, else those that would penetrate.
-    Without a plate the start has no force at all, if its residual is smaller: forces that bond rigid bodies are of any
-    size. On
-    elastic bodies Newton's method cycles from there, because it takes contacts for sliding before friction acts.
+    All contacts are glued if a plate presses the bodies together, else those that would penetrate. Without a plate the
+    start has no force at all, if its residual is smaller: forces that bond rigid bodies are of any size. On elastic
+    bodies Newton's method cycles from there, because it takes contacts for sliding before friction acts.
 
     Parameters
     ----------
@@ -254,12 +253,9 @@ def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
     """Choose the contacts that the bonded solution glues.
 
     Where loads press free bodies together these are all contacts that the loads may close, and otherwise those that
-    would
-    penetrate. One contact i that bears the load F of a pair alone closes once the bodies have approached by q_i + Q_ii
-    F.
-    Further contacts only stiffen the pair. So no contact closes whose gap exceeds the least of these approaches, unless
-    a body
-    turns. All are glued where the near ones alone would leave a motion free.
+    would penetrate. One contact i that bears the load F of a pair alone closes once the bodies have approached by q_i +
+    Q_ii F. Further contacts only stiffen the pair. So no contact closes whose gap exceeds the least of these
+    approaches, unless a body turns. All are glued where the near ones alone would leave a motion free.
 
     Parameters
     ----------

@@ -77,8 +77,7 @@ def interior_iterates(
     ------
     tuple
         A point (r (k, dim), lambda (p,)) in the cones, and how far it is from a solution: the largest of the mean
-        complementarity,
-        the error of the law and that of the balance [-].
+        complementarity, the error of the law and that of the balance [-].
     """
     path = path or Path()
     full = path.full

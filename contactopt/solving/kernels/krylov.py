@@ -46,8 +46,7 @@ def model_of(problem: InterfaceProblem, name: str | None = None, deflate: bool =
         The interface problem.
     name
         A name in PRECONDITIONERS, or 'none' for the identity. By default `neumann` where the contacts lie on a grid,
-        `laplacian` on
-        other surfaces whose cells are known, else the identity, with a note that says why.
+        `laplacian` on other surfaces whose cells are known, else the identity, with a note that says why.
     deflate
         Whether the smooth motions of the bodies are solved for exactly, which costs a few products with Q.
 

@@ -188,9 +188,8 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
     """Make a preconditioner exact on some columns: c (I - Z A^-1 Z'Q) P (I - Q Z A^-1 Z') + Z A^-1 Z' with A = Z'QZ.
 
     The factor c puts the eigenvalues of P Q about 1, where those of the exact part are. It needs j + 1 products with Q
-    once;
-    each application adds O(n j). Its inverse is the block secant update of P^-1 = G,
-    G/c - G/c Z (Z'G/c Z)^-1 Z'G/c + QZ A^-1 (QZ)'.
+    once; each application adds O(n j). Its inverse is the block secant update of P^-1 = G, G/c - G/c Z (Z'G/c Z)^-1
+    Z'G/c + QZ A^-1 (QZ)'.
 
     Sources: Mandel (1993), Balancing domain decomposition; Schnabel (1983), Quasi-Newton methods using multiple secant
     equations.
