@@ -26,12 +26,11 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.coupled import CoupledForm
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.problem.stacked import Stacked, Vector, norm
-from contactopt.solving.constants import LOOSE
+from contactopt.solving.constants import LOOSE, SLIPPING
 from contactopt.solving.kernels.bonded import Bonded
 from contactopt.solving.kernels.coupled import fitted
 from contactopt.solving.kernels.flexible import flexible_gmres
 from contactopt.solving.kernels.krylov import model_of
-from contactopt.solving.kernels.linearised import SLIPPING
 from contactopt.solving.preconditioners import Preconditioner
 
 SINGULAR = 1e-13  # reciprocal condition of K below which it counts as singular

@@ -15,12 +15,12 @@ from scipy.sparse.linalg import splu
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
-from contactopt.solving.constants import LOOSE
+from contactopt.solving.constants import KRYLOV_FIRST, KRYLOV_LOOSEST, KRYLOV_TIGHTEST, LOOSE
 from contactopt.solving.kernels.bonded import SOFTEST, Bonded
 from contactopt.solving.kernels.krylov import krylov_step, model_of
 from contactopt.solving.kernels.semismooth import RIDGE, Equations
 
-FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-4  # accuracy of an iterative step: the first, and the bounds of the others
+FIRST = KRYLOV_FIRST  # also of the bonded solution
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
 
 LEAST_REACH = 1e-12  # of a multiplier's column of V, which is dimensionless
@@ -45,11 +45,11 @@ def forcing(residual: float, last: float) -> float:
     Returns
     -------
     float
-        The accuracy, between TIGHTEST and LOOSEST.
+        The accuracy, between KRYLOV_TIGHTEST and KRYLOV_LOOSEST.
     """
     if last in (0.0, np.inf):
-        return FIRST if last else TIGHTEST
-    return min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2))
+        return FIRST if last else KRYLOV_TIGHTEST
+    return min(KRYLOV_LOOSEST, max(KRYLOV_TIGHTEST, 0.5 * (residual / last) ** 2))
 
 
 def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = None, weight: float = 0.0) -> Equations:

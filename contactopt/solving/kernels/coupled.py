@@ -27,6 +27,14 @@ from contactopt.problem.certificate import Moved
 from contactopt.problem.coupled import CoupledForm
 from contactopt.problem.stacked import Stacked, norm
 from contactopt.problem.threads import one_blas_thread
+from contactopt.solving.constants import (
+    COUPLED_FIRST,
+    COUPLED_LOOSEST,
+    COUPLED_TIGHTEST,
+    GIVEN_BALANCE,
+    SCHUR_MARGIN,
+    SCHUR_STEP,
+)
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.alart_curnier import coulomb_equations, glued_contacts, glued_projection
 from contactopt.solving.kernels.flexible import flexible_gmres
@@ -35,10 +43,6 @@ from contactopt.solving.kernels.linearised import Linearised
 from contactopt.solving.kernels.semismooth import Equations
 from contactopt.solving.preconditioners import Preconditioner
 
-FIRST, LOOSEST, TIGHTEST = 0.1, 0.1, 1e-2  # accuracy of a step: the first two, and the bounds of the others
-INNER = 1e-2  # accuracy of the Schur complement of the model
-MARGIN = 1.5  # the model's Schur complement over that of a mean fit
-GIVEN = 1e-3  # accuracy of equilibrium under forces to start from
 MOST_ITERATIONS = 60  # conjugate gradient iterations towards it
 
 Known = tuple[np.ndarray, np.ndarray, Moved]  # reactions (k, dim), multipliers (p,) and Q r
@@ -94,7 +98,7 @@ class Coupled:
 
         def precondition(x: Stacked) -> Stacked:
             forces, error, balance = _parted(x)
-            r, multipliers = linearised.solve(model, inverse, error, -balance, INNER)
+            r, multipliers = linearised.solve(model, inverse, error, -balance, SCHUR_STEP)
             return _joined(form.approximate(forces + form.pulled(r)), r, multipliers)
 
         change = flexible_gmres(product, precondition, right, self.weights, rtol)
@@ -154,13 +158,17 @@ def coupled_steps(
             residual = coupled.size(right)
             known = coupled.judged(at, _parted(right)[1].reshape(at.r.shape))
         yield known, residual
-        rtol = min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else FIRST
+        rtol = (
+            min(COUPLED_LOOSEST, max(COUPLED_TIGHTEST, 0.5 * (residual / last) ** 2))
+            if np.isfinite(last)
+            else COUPLED_FIRST
+        )
         with one_blas_thread():
             at, last = coupled.step(at, right, linearised, rtol), residual
 
 
 def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
-    """The bonded solution of contactopt.solving.kernels.alart_curnier.cold_start, to FIRST, or no force at all."""
+    """The bonded solution of contactopt.solving.kernels.alart_curnier.cold_start, to COUPLED_FIRST, or no force at all."""
     none = np.zeros(problem.q.shape)
     zero = State(coupled.form.pulled(none.ravel()), none, np.zeros(len(problem.s)))
     glued = glued_contacts(problem)
@@ -168,14 +176,14 @@ def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
         return zero
     glue = Coupled(glued_projection(coupled.equations, glued), coupled.form, coupled.P)
     right, linearised = glue.linearised(zero)
-    bonded = glue.step(zero, right, linearised, FIRST)
+    bonded = glue.step(zero, right, linearised, COUPLED_FIRST)
     if bonded is None or len(problem.s):
         return bonded or zero
     return min(zero, bonded, key=lambda state: coupled.size(coupled.linearised(state)[0]))
 
 
 def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
-    """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / MARGIN where a random force does most of
+    """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / SCHUR_MARGIN where a random force does most of
     its work.
 
     One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur complement that is rather
@@ -195,12 +203,12 @@ def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
     """
     x = np.random.default_rng(0).normal(size=P.shape[0])
     Qx = form.moved(form.approximate(form.pulled(x)), x)
-    factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / MARGIN, P.model
+    factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / SCHUR_MARGIN, P.model
     stiff = None if model is None else lambda y: model @ y / factor
     return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
 
 
-def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN) -> Stacked:
+def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN_BALANCE) -> Stacked:
     """Displacements X close to A^-1 T' r, by conjugate gradients with V-cycles."""
     residual = form.pulled(r.ravel())
     X, size, goal = 0.0 * residual, 1.0, 0.0

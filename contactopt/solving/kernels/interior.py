@@ -22,18 +22,33 @@ import numpy as np
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import coulomb_cone
+from contactopt.solving.constants import (
+    BACKTRACK,
+    BOUNDARY,
+    CENTRAL,
+    CENTRAL_KEPT,
+    CORRECTED,
+    FRICTIONLESS,
+    INTERIOR_PROGRESS,
+    INTERIOR_STEPS,
+    LEAST_CENTERING,
+    LEAST_SMOOTHING,
+    MOST_CENTERING,
+    MOST_SMOOTHING,
+    PREDICTED,
+    ROUGHEST,
+    SHORT,
+    STALLED,
+    START,
+    STUCK,
+    STUCK_CENTERING,
+)
 from contactopt.solving.kernels.sparse_blocks import Blocks, Solver, bordered
 
-SMOOTH, ROUGH = 1e-4, 1e3  # friction coefficients below and above which they count as none and as this
-ITERATIONS = 60
 NEAR = 1e-9  # complementarity and residual at which it ends
-CENTRAL = 1e-3  # least eigenvalue of x o z at a contact, over the mean
-BOUNDARY, SHORT = 0.98, 0.9  # of the way to the boundary of the cones
-STALLED = 12  # iterations without progress
-RIDGE = 1e-10
-START = 100.0  # size of the first point in both cones, over dimensionless forces of order one
-SMOOTHING = 0.03, 0.3  # least and largest smoothing of random paths
-STUCK = 0.3  # a step shorter than this is no Newton step; the next one leaves |u_t| as it is
+RIDGE = 1e-10  # added to the diagonal of the dimensionless Q, for directions without compliance
+TINY = 1e-20  # added to |u_t|^2, whose root has no derivative at zero
+BACKTRACKS = 30  # shortenings of a step, which leave a thousandth of it
 
 Iterate = tuple[np.ndarray, np.ndarray]
 
@@ -56,7 +71,7 @@ class Path:
     def random(cls, rng: np.random.Generator, contacts: int) -> Path:
         """A path drawn at random."""
         size = START ** rng.uniform() * np.exp(rng.normal(size=(2, contacts)))
-        return cls(smooth=float(np.exp(rng.uniform(*np.log(SMOOTHING)))), first=size)
+        return cls(smooth=float(np.exp(rng.uniform(*np.log((LEAST_SMOOTHING, MOST_SMOOTHING))))), first=size)
 
 
 def interior_iterates(
@@ -82,8 +97,8 @@ def interior_iterates(
     path = path or Path()
     full = path.full
     k, d = problem.q.shape
-    mu = np.where(problem.mu < SMOOTH, 1.0, np.minimum(problem.mu, ROUGH))
-    smooth = problem.mu < SMOOTH
+    mu = np.where(problem.mu < FRICTIONLESS, 1.0, np.minimum(problem.mu, ROUGHEST))
+    smooth = problem.mu < FRICTIONLESS
     scale = np.ones((k, d))
     scale[:, 0] = 1 / mu  # r = scale x, z = scale (u + mu |u_t| n)
     kept = np.ones((k, d), dtype=bool)
@@ -92,8 +107,8 @@ def interior_iterates(
     x, z, lam = np.zeros((k, d)), np.zeros((k, d)), np.zeros(p)
     x[:, 0], z[:, 0] = path.first
     best, since, last = np.inf, 0, 1.0
-    for _ in range(ITERATIONS):
-        slip = np.sqrt(np.sum(z[:, 1:] ** 2, axis=1) + (path.smooth * z[:, 0]) ** 2 + 1e-20)
+    for _ in range(INTERIOR_STEPS):
+        slip = np.sqrt(np.sum(z[:, 1:] ** 2, axis=1) + (path.smooth * z[:, 0]) ** 2 + TINY)
         r = scale * x
         gap = scale * ((matrix.Q @ r.ravel() + V @ lam).reshape(k, d) + problem.q) - z
         gap[:, 0] += np.where(smooth, 0.0, slip)
@@ -102,7 +117,7 @@ def interior_iterates(
         mean = float(np.sum(x * z)) / k
         error = max(mean, float(np.linalg.norm(gap)) / np.sqrt(k), float(np.abs(unbalanced).max(initial=0.0)))
         yield (coulomb_cone(r, problem.mu), lam), error
-        since = 0 if error < 0.9 * best else since + 1
+        since = 0 if error < INTERIOR_PROGRESS * best else since + 1
         best = min(best, error)
         if error < NEAR or since >= STALLED or not np.isfinite(error):
             return
@@ -119,20 +134,22 @@ def interior_iterates(
         first = direction(-z)
         if first is None:
             return
-        length = min(1.0, 0.99 * scaling.longest(first[0], first[1]))
+        length = min(1.0, PREDICTED * scaling.longest(first[0], first[1]))
         ahead = float(np.sum((x + length * first[0]) * (z + length * first[1]))) / k
-        centering = float(np.clip(np.clip(ahead / mean, 0.0, 1.0) ** 3, 1e-4 if bend else 0.1, 0.95))
-        second = scaling.corrector(first[0], first[1]) if length > 0.1 else 0.0
+        centering = float(
+            np.clip(np.clip(ahead / mean, 0.0, 1.0) ** 3, LEAST_CENTERING if bend else STUCK_CENTERING, MOST_CENTERING)
+        )
+        second = scaling.corrector(first[0], first[1]) if length > CORRECTED else 0.0
         step = direction(centering * mean * scaling.inverse - z - second)
         if step is None:
             return
         length = min(1.0, (SHORT if full else BOUNDARY) * scaling.longest(step[0], step[1]))
-        least = np.minimum(CENTRAL, 0.5 * scaling.centrality / mean)
-        for _ in range(30):
+        least = np.minimum(CENTRAL, CENTRAL_KEPT * scaling.centrality / mean)
+        for _ in range(BACKTRACKS):
             new = x + length * step[0], z + length * step[1]
             if np.all(np.sqrt(np.maximum(_det(new[0]) * _det(new[1]), 0.0)) >= least * np.sum(new[0] * new[1]) / k):
                 break
-            length *= 0.8
+            length *= BACKTRACK
         last = length
         x, z, lam = new[0], new[1], lam + length * step[2]
 

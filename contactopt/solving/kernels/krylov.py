@@ -22,6 +22,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import loosened
+from contactopt.solving.constants import MODEL_PRODUCTS, MODEL_STEP, PRODUCT_SHARE
 from contactopt.solving.kernels.linearised import CYCLES, RESTART, Linearised
 from contactopt.solving.kernels.semismooth import Equations
 from contactopt.solving.notes import note
@@ -30,9 +31,6 @@ from contactopt.solving.preconditioners import Preconditioner, deflated, precond
 logger = logging.getLogger(__name__)
 
 FLAT = 1e-8  # eigenvalues of D below this are zero
-PRODUCTS = 0.05  # accuracy of products, over that of the step
-INNER = 1e-3  # and of the model's GMRES, which costs next to nothing
-MODEL = 1e-4  # accuracy of the products that make the model
 
 Step = tuple[np.ndarray, np.ndarray]  # dr (k, d), dlambda (p,)
 
@@ -64,7 +62,7 @@ def model_of(problem: InterfaceProblem, name: str | None = None, deflate: bool =
     for choice in ("neumann", "laplacian") if name is None else (name,) * (name != "none"):
         try:
             P = preconditioner(problem, choice)
-            return deflated(P, loosened(problem.Q, MODEL), smooth_motions(problem)) if deflate else P
+            return deflated(P, loosened(problem.Q, MODEL_PRODUCTS), smooth_motions(problem)) if deflate else P
         except InputError as error:
             if name is not None:
                 raise
@@ -110,7 +108,7 @@ def krylov_step(
 def _symmetric_step(
     equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
 ) -> Step:
-    Q, V = loosened(equations.Q, PRODUCTS * rtol), equations.V
+    Q, V = loosened(equations.Q, PRODUCT_SHARE * rtol), equations.V
     # The unknowns alpha are the amounts of the directions U in which a contact may still change its force.
     U, delta, rho = _directions(D, equations.rho)
     # B of the module's head; a proximal subproblem adds its weight to Q.
@@ -169,7 +167,7 @@ def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarr
 def _unsymmetric_step(
     equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
 ) -> Step:
-    Q, linearised = loosened(equations.Q, PRODUCTS * rtol), Linearised(equations, D)
-    inverse = linearised.inverse(P, INNER * rtol)
+    Q, linearised = loosened(equations.Q, PRODUCT_SHARE * rtol), Linearised(equations, D)
+    inverse = linearised.inverse(P, MODEL_STEP * rtol)
     dr, multipliers = linearised.solve(lambda x: Q @ x, inverse, error.ravel(), balance, rtol)
     return dr.reshape(error.shape), multipliers

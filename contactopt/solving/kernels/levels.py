@@ -22,12 +22,11 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.convolution import Convolution, Kernel, backward, forward
 from contactopt.problem.counter import Counter
 from contactopt.problem.laws import Law
+from contactopt.solving.constants import COARSEST, FIRST_SHIFT, LEAST_DETERMINANT, LEAST_SYMBOL, SHIFT_RATIO
 from contactopt.solving.deadline import check_time
 
 RESTART, CYCLES = 40, 3  # of GMRES
 ITERATIONS = 100  # of PCG
-COARSEST = 12  # contacts a side
-FIRST, RATIO = 0.5, 32.0  # of the shifts of `_shift_shares`: where they begin to grow, and by how much
 
 Point = tuple[np.ndarray, np.ndarray]  # reactions (c, k), multipliers (p,)
 
@@ -175,7 +174,7 @@ class Level:
             low = symbol.ravel()[1:].min() if self.periodic else 0.0
             if self.periodic:
                 symbol.flat[0] = 2 * symbol.max()
-            return np.maximum(symbol, max(low, 1e-3 * float(np.median(symbol)))) + shift
+            return np.maximum(symbol, max(low, LEAST_SYMBOL * float(np.median(symbol)))) + shift
 
         if not components:
             return {}
@@ -183,7 +182,7 @@ class Level:
         if len(components) == 1:
             return {(components[0], components[0]): (1 / first).astype(np.float32)}
         second, mixed = positive(symbols[2, 2]), symbols[1, 2][every] if (1, 2) in symbols else 0.0 * first
-        determinant = np.maximum(first * second - mixed**2, 0.1 * first * second)
+        determinant = np.maximum(first * second - mixed**2, LEAST_DETERMINANT * first * second)
         inverse = {(1, 1): second / determinant, (2, 2): first / determinant, (1, 2): -mixed / determinant}
         return {pair: symbol.astype(np.float32) for pair, symbol in inverse.items()}
 
@@ -401,9 +400,9 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
 def _shift_shares(sigma: np.ndarray, largest: float) -> tuple[np.ndarray, list[np.ndarray]]:
     """Shifts from 0 to beyond `largest`, and the share (k, j) that each sigma (k, j) has in each of them.
 
-    The shares are hat functions of log(FIRST + sigma); those of sigma beyond the last shift sum to less than one.
+    The shares are hat functions of log(FIRST_SHIFT + sigma); those of sigma beyond the last shift sum to less than one.
     """
-    count = int(np.ceil(np.log(1 + largest / FIRST) / np.log(RATIO)))
-    place = np.log1p(sigma / FIRST) / np.log(RATIO)
+    count = int(np.ceil(np.log(1 + largest / FIRST_SHIFT) / np.log(SHIFT_RATIO)))
+    place = np.log1p(sigma / FIRST_SHIFT) / np.log(SHIFT_RATIO)
     shares = [np.maximum(0.0, 1 - np.abs(place - j)) for j in range(count + 1)]
-    return FIRST * (RATIO ** np.arange(count + 1) - 1.0), shares
+    return FIRST_SHIFT * (SHIFT_RATIO ** np.arange(count + 1) - 1.0), shares

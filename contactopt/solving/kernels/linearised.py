@@ -14,11 +14,11 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from contactopt.solving.constants import SLIPPING
 from contactopt.solving.kernels.semismooth import Equations
 from contactopt.solving.preconditioners import Preconditioner
 
 RESTART, CYCLES = 60, 3  # of GMRES
-SLIPPING = 0.5  # diagonal entries of D below this count as zero where only a rough inverse is asked for
 
 Act = Callable[[np.ndarray], np.ndarray]
 

@@ -26,14 +26,11 @@ from scipy.sparse.linalg import splu
 
 from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
+from contactopt.solving.constants import FIRST_BALANCING, LEAST_CHANGE, MOST_CHANGE
 from contactopt.solving.methods import NATIVE, Iterate
 
 OVER = 1.6  # over-relaxation, between 1.5 and 1.8 in the literature
-FIRST = 10  # iteration of the first balancing of rho
 Inverse = Callable[[np.ndarray], np.ndarray]  # x (n,) or (n, j) -> (Q + rho I)^-1 x
-
-CHANGE = 10.0  # largest factor by which rho changes at once
-WORTH = 2.0  # smallest factor that is worth a factorisation
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,7 @@ class ADMM:
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         z, multipliers = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        rho, count, check = self.rho, 0, FIRST
+        rho, count, check = self.rho, 0, FIRST_BALANCING
         system = Balanced(problem, rho)
         x = np.zeros_like(z) if start is None else -problem.displacements(z, multipliers) / rho
         law = problem.law
@@ -78,8 +75,8 @@ class ADMM:
                 primal = float(np.linalg.norm(r - z)) / max(float(np.linalg.norm(z)), 1e-300)
                 moved = (problem.Q @ z.ravel(), problem.q, rho * x)  # what the velocity is the difference of
                 dual = rho * float(np.linalg.norm(z - old)) / max(*(float(np.linalg.norm(m)) for m in moved), 1e-300)
-                factor = float(np.clip(np.sqrt(max(primal, 1e-300) / max(dual, 1e-300)), 1 / CHANGE, CHANGE))
-                if not 1 / WORTH < factor < WORTH:
+                factor = float(np.clip(np.sqrt(max(primal, 1e-300) / max(dual, 1e-300)), 1 / MOST_CHANGE, MOST_CHANGE))
+                if not 1 / LEAST_CHANGE < factor < LEAST_CHANGE:
                     rho, x = rho * factor, x / factor
                     system = Balanced(problem, rho)
 

@@ -23,10 +23,10 @@ import numpy as np
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
 from contactopt.problem.laws import Projected
-from contactopt.solving.constants import SHARPER, SHARPEST
+from contactopt.solving.constants import EIGENVALUE_MARGIN, SHARPER, SHARPEST
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.balance import project_balanced
-from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue
+from contactopt.solving.kernels.mprgp import largest_eigenvalue
 from contactopt.solving.methods import NATIVE, Iterate
 
 INNER = 2000  # products with Q in one subproblem
@@ -44,7 +44,7 @@ class APG:
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        step = 1 / (MARGIN * largest_eigenvalue(problem.Q) or 1.0)
+        step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(problem.Q) or 1.0)
         law, target = problem.law, 1e-3
         while True:
             q, r_n = problem.q.copy(), r[:, 0]
@@ -96,7 +96,7 @@ def disc_qp(
     precision at the start of a round and its change in single precision, which halves the memory traffic.
     """
     single, none = Q.astype(np.float32), np.zeros(0)
-    step = 1 / (MARGIN * largest_eigenvalue(single) or 1.0)
+    step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(single) or 1.0)
     t = disc(np.zeros_like(c) if start is None else start, radius)
     before = np.inf
     for _ in range(ROUNDS):

@@ -23,21 +23,22 @@ from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import Law
+from contactopt.solving.constants import (
+    CLOSER,
+    COARSE_ENOUGH,
+    COARSE_STEPS,
+    COARSE_TRIES,
+    COARSEST_ENOUGH,
+    NESTED_LOOSEST,
+    NESTED_TIGHTEST,
+)
 from contactopt.solving.kernels.levels import Evaluation, Level, Point, step
 from contactopt.solving.methods import NATIVE, Iterate, find_method
 from contactopt.solving.notes import note
 
 logger = logging.getLogger(__name__)
 
-LOOSEST, TIGHTEST = 0.1, 1e-4  # relative accuracy of a step: while contacts still open or close, and at last
-ROUGH = 3e-2  # residual at which a coarse grid has done its work, over the size of the forces
-SURE = 1e-4  # and the coarsest grid, from which the others must not be led astray
-NEAR = 1e-8  # and from which on iterates of the finest grid are shown to the driver
-CLOSER = (
-    0.1  # residual of a given start over that of the coarse grids' answer from which on Newton's steps go on from it
-)
-STEPS = 30  # on a coarse grid
-TRIES = 80  # iterates of the default method there, where Newton's steps fail
+NEAR = 1e-8  # residual over the size of the forces, from which on iterates of the finest grid are shown to the driver
 
 
 @dataclass(frozen=True)
@@ -111,27 +112,30 @@ def _first_guess(levels: list[Level], given: Point | None) -> Point:
 
 def _robust_start(coarsest: Level, point: Point) -> Point:
     """A solution on the coarsest grid: by Newton's steps, or where they go astray by the default method on an array Q."""
-    reached, at = _solve_level(coarsest, point, SURE)
-    if at.residual <= SURE * float(np.linalg.norm(reached[0])) or len(coarsest.components) < coarsest.kernel.dim:
+    reached, at = _solve_level(coarsest, point, COARSEST_ENOUGH)
+    if (
+        at.residual <= COARSEST_ENOUGH * float(np.linalg.norm(reached[0]))
+        or len(coarsest.components) < coarsest.kernel.dim
+    ):
         return reached
     note(logger, "Newton's method failed on the coarsest grid, so the default method starts there from an array Q")
     V = np.moveaxis(coarsest.V, 0, 1).reshape(coarsest.q.size, -1)
     small = InterfaceProblem(coarsest.kernel.entries(), coarsest.q.T, coarsest.law, V=V, s=coarsest.s)
     best = at.residual
-    for r, lam, *_ in islice(find_method("auto").iterate(small), TRIES):
+    for r, lam, *_ in islice(find_method("auto").iterate(small), COARSE_TRIES):
         candidate = np.ascontiguousarray(r.T), lam
         residual = coarsest.evaluate(*candidate).residual
         if residual < best:
             reached, best = candidate, residual
-        if best <= SURE * float(np.linalg.norm(reached[0])):
+        if best <= COARSEST_ENOUGH * float(np.linalg.norm(reached[0])):
             break
     return reached
 
 
-def _solve_level(level: Level, point: Point, enough: float = ROUGH) -> tuple[Point, Evaluation]:
+def _solve_level(level: Level, point: Point, enough: float = COARSE_ENOUGH) -> tuple[Point, Evaluation]:
     """Newton's steps on a coarse grid, until the residual is small beside the forces."""
     at, last = level.evaluate(*point), np.inf
-    for _ in range(STEPS):
+    for _ in range(COARSE_STEPS):
         if at.residual <= enough * float(np.linalg.norm(point[0])):
             break
         change, _ = step(level, at, _worth(at.residual, last))
@@ -143,7 +147,9 @@ def _solve_level(level: Level, point: Point, enough: float = ROUGH) -> tuple[Poi
 
 def _worth(residual: float, last: float) -> float:
     """Relative accuracy of a step: little while the residual does not fall, because the contacts still change."""
-    return min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else LOOSEST
+    return (
+        min(NESTED_LOOSEST, max(NESTED_TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else NESTED_LOOSEST
+    )
 
 
 def _whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:
