@@ -205,8 +205,8 @@ def _eliminate(pp: np.ndarray, pq: np.ndarray, qp: np.ndarray, qq: np.ndarray) -
 def _excess(punch: UnitPunch, mu: float) -> float:
     """q - mu p at the end of the stick zone: zero for the right one, positive where it is too large."""
     end = np.count_nonzero(punch.panels.stick)
-    last = slice(end - ORDER, end)
-    return float(np.sum(TRANSFORM @ (punch.q[last] - mu * punch.p[last])))
+    panel = slice(end - ORDER, end)
+    return float(np.sum(TRANSFORM @ (punch.q[panel] - mu * punch.p[panel])))
 
 
 def _uncoupled(mu: float, beta: float, axisymmetric: bool) -> float:

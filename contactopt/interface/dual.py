@@ -64,6 +64,7 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
         up to one, and the distances between the surfaces.
     """
     count = own.cells.shape[1]
+    # The cells that the other side covers at all, and the face and the place in it of each.
     used, cell = np.unique(points.cell, return_inverse=True)
     face, local = used // len(own.cells), used % len(own.cells)
 
@@ -72,26 +73,32 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
     def summed(values: np.ndarray) -> np.ndarray:
         return np.add.reduceat(values, first, axis=1).T
 
+    # Per cell: a_v = int phi_v, the mean of every hat function, and the matrix int (phi_v - mean) (phi_w - mean).
     phi = own.hats(points.cell % len(own.cells), points.at)
     area = summed(phi * points.measure)  # (cell, v)
     whole = area.sum(axis=1)
     mean = area / whole[:, None]
     centred = phi - mean[cell].T
     mass = summed((centred[:, None] * centred * points.measure).reshape(count * count, -1)).reshape(-1, count, count)
+    # The best linear fit of f at vertex v is the mean of f plus its slopes, fit (v, w) int centred_w f.
     fit = _slopes(mass, area, whole)  # value at vertex v less the mean = fit (v, w) int centred_w f
 
     def functional(values: np.ndarray, block: slice) -> np.ndarray:
         """(pair, v, j) int psi_v f_j over the points of a block, summed for every pair of a cell and a face."""
         c = cell[block]
+        # psi_v = a_v (1 / whole + fit centred) on the cell, times the measure of every point.
         dual = area[c].T * (1 / whole[c] + np.einsum("gvw,wg->vg", fit[c], centred[:, block]))
         weighted = dual * points.measure[block]
         return np.stack([np.add.reduceat(w * values, pairs, axis=1).T for w in weighted], axis=1)
 
+    # Vertices of cells become contacts; those that are hardly covered pass their share on.
     nodes, rows = np.unique(own.faces[face[:, None], own.cells[local]], return_inverse=True)
     rows = _pass_on(rows.reshape(area.shape), area, whole)
     strong, rows = np.unique(rows, return_inverse=True)
     nodes, rows = nodes[strong], rows.reshape(area.shape)
     areas = np.bincount(rows.ravel(), area.ravel(), len(nodes))
+    # Sum int psi_i N_j over blocks of points, so that memory stays bounded: W of the own side, W' of the other, and
+    # the mean vector x - x' between the true places on both surfaces.
     W = sp.csr_matrix((len(nodes), own.points.shape[1]))
     W_other = sp.csr_matrix((len(nodes), other.points.shape[1]))
     apart = np.zeros((own.dim, len(nodes)))
@@ -119,6 +126,7 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
                     )
                     W_other = W_other + term @ rounding.rises
             places.append(surface.true(surface.locations(faces[block], at[:, block])[0]))
+        # The deepest overlap of the surfaces, for a message.
         distance = -np.sum((places[0] - places[1]) * _unit_normals(own, points, block), axis=0)
         if distance.min() < least:
             least, deepest = float(distance.min()), places[0][:, np.argmin(distance)]

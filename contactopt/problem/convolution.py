@@ -135,12 +135,12 @@ class Kernel:
         for pair, symbol in self.symbols.items():
             odd = _odd_axes(*pair, len(self.grid))
             for axis, size in enumerate(self.padded):
-                last = axis == len(self.padded) - 1
-                count = size // 2 + 1 if last else size
+                halved = axis == len(self.padded) - 1
+                count = size // 2 + 1 if halved else size
                 shape = [count if i == axis else 1 for i in range(symbol.ndim)]
                 weighted = symbol * (np.cos(np.pi * np.arange(count) / size) ** 2).reshape(shape)
-                low = np.take(weighted, range(size // 4 + 1 if last else size // 2), axis)
-                if last:  # the frequency k + M / 2 is minus the frequency M / 2 - k
+                low = np.take(weighted, range(size // 4 + 1 if halved else size // 2), axis)
+                if halved:  # the frequency k + M / 2 is minus the frequency M / 2 - k
                     high = np.take(weighted, range(size // 2, size // 4 - 1, -1), axis)
                     high = _negated(high, axis, odd)
                 else:

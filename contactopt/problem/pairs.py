@@ -99,5 +99,5 @@ def alone(problem: InterfaceProblem, solution: Solution, pair: Pair) -> tuple[In
         return problem, solution
     part, r, lam = part_of(problem, pair), solution.reactions[pair.contacts], solution.multipliers
     apart = problem.displacements(solution.reactions, lam)[pair.contacts] - part.displacements(r, lam)
-    held = replace(part, q=part.q + apart, s=-(part.V.T @ r.ravel()))
-    return held, replace(solution, reactions=r, displacements=None)
+    own = replace(part, q=part.q + apart, s=-(part.V.T @ r.ravel()))
+    return own, replace(solution, reactions=r, displacements=None)

@@ -57,15 +57,15 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     force = balanced or _closing(problem) / compliance or 1.0
     length = force * compliance
     columns = np.where(columns > 0, columns, 1.0)
-    rigid = immovable(problem)
+    held = immovable(problem)
     Q: Interface
     if isinstance(problem.Q, InterfaceOperator):
-        Q = problem.Q.scaled(1 / compliance, rigid.astype(float))
+        Q = problem.Q.scaled(1 / compliance, held.astype(float))
     elif sp.issparse(problem.Q):
-        Q = sp.csr_array(problem.Q / compliance + sp.diags_array(rigid.astype(float)))
+        Q = sp.csr_array(problem.Q / compliance + sp.diags_array(held.astype(float)))
     else:
         entries = np.array(problem.Q / compliance)
-        entries[rigid, rigid] = 1.0
+        entries[held, held] = 1.0
         Q = entries
     scaled = replace(
         problem,
@@ -93,11 +93,11 @@ def immovable(problem: InterfaceProblem) -> np.ndarray:
     """
     d = np.abs(diagonal(problem.Q))
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
-    still = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
-    if still.any() and not isinstance(problem.Q, InterfaceOperator):
-        rows = np.flatnonzero(still)
-        still[rows] = row_sizes(problem.Q[rows]) <= NOISE * d.max(initial=0.0)
-    return still
+    held = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
+    if held.any() and not isinstance(problem.Q, InterfaceOperator):
+        rows = np.flatnonzero(held)
+        held[rows] = row_sizes(problem.Q[rows]) <= NOISE * d.max(initial=0.0)
+    return held
 
 
 def _closing(problem: InterfaceProblem) -> float:

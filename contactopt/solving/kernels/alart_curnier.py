@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
 from contactopt.solving.constants import KRYLOV_FIRST, KRYLOV_LOOSEST, KRYLOV_TIGHTEST, LOOSE
-from contactopt.solving.kernels.bonded import SOFTEST, Bonded
+from contactopt.solving.kernels.bonded import LEAST_PIVOT, Bonded
 from contactopt.solving.kernels.krylov import krylov_step, model_of
 from contactopt.solving.kernels.semismooth import RIDGE, Equations
 
@@ -103,7 +103,7 @@ def definite(Q: sp.csr_array) -> bool:
         pivots = splu(sp.csc_array(Q), diag_pivot_thresh=0.0, options={"SymmetricMode": True}).U.diagonal()
     except RuntimeError:
         return False
-    return bool(pivots.min() > SOFTEST**2 * pivots.max())
+    return bool(pivots.min() > LEAST_PIVOT**2 * pivots.max())
 
 
 def _bonded_factor(problem: InterfaceProblem) -> Bonded | None:

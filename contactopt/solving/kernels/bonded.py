@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 
-SOFTEST = 1e-7  # least diagonal entry of the factor, over the largest: below, Q is too near to singular for this
+LEAST_PIVOT = 1e-7  # least diagonal entry of the factor, over the largest: below, Q is too near to singular for this
 
 
 class Bonded:
@@ -27,7 +27,7 @@ class Bonded:
             raise la.LinAlgError("Q is not symmetric")
         self.factor = la.cho_factor(Q, lower=True, check_finite=False)
         diagonal = np.diag(self.factor[0])
-        if diagonal.min() < SOFTEST * diagonal.max():
+        if diagonal.min() < LEAST_PIVOT * diagonal.max():
             raise la.LinAlgError("Q is nearly singular")
         self.V = V
         self.X = la.cho_solve(self.factor, V, check_finite=False) if V.shape[1] else V

@@ -201,6 +201,7 @@ def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
     Preconditioner
         P and its model, scaled.
     """
+    # The mean eigenvalue of P Q, weighted with the work of a random force x: (Qx)' P (Qx) over x' Qx.
     x = np.random.default_rng(0).normal(size=P.shape[0])
     Qx = form.moved(form.approximate(form.pulled(x)), x)
     factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / SCHUR_MARGIN, P.model
@@ -210,6 +211,8 @@ def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
 
 def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN_BALANCE) -> Stacked:
     """Displacements X close to A^-1 T' r, by conjugate gradients with V-cycles."""
+    # Conjugate gradients on A X = T' r with B, one V-cycle, as preconditioner; `size` is the energy residual' B
+    # residual.
     residual = form.pulled(r.ravel())
     X, size, goal = 0.0 * residual, 1.0, 0.0
     p = X

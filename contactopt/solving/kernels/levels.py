@@ -272,6 +272,7 @@ def _symmetric(
     """Q dr + V dlambda = error / rho - Q known, V' dr = balance on the closed contacts, by projected PCG."""
     c, m = moved.shape
     act = _act(level, at.closed, at.error.shape)
+    # W holds the columns of the balance; N is the rough inverse, normal and tangential components by themselves.
     right = (at.error[:, at.closed] / level.rho - moved).ravel()
     W = V.reshape(c * m, -1)
     normal, tangential = (level.components[:1], level.components[1:])
@@ -283,15 +284,18 @@ def _symmetric(
             out.append(level.rough_solve(parts[1:], at.closed, tangential))
         return np.concatenate(out).astype(float).ravel()
 
+    # Y = N W and K = (W'N W)^-1. The start x = Y K balance meets the balance W'x; all corrections keep it.
     Y = np.stack([near(w) for w in W.T], axis=1) if W.shape[1] else W
     K = np.linalg.pinv(W.T @ Y)
     x = Y @ (K @ balance)
     residual = right - (act(x.reshape(c, m)).ravel() if np.any(x) else 0.0)
 
     def projected(residual: np.ndarray) -> np.ndarray:
+        # I - Y K W' takes the part out of N residual that would change the balance.
         z = near(residual)
         return np.asarray(z - Y @ (K @ (W.T @ z)))
 
+    # Conjugate gradients among the x that meet the balance, until residual' N residual has fallen enough.
     z = projected(residual)
     gamma = float(residual @ z)
     aim, p, count = rtol**2 * abs(gamma), z, 0
@@ -303,6 +307,7 @@ def _symmetric(
         z = projected(residual)
         new = float(residual @ z)
         p, gamma, count = z + (new / gamma) * p, new, count + 1
+    # What is left of the residual is W lambda; least squares in the norm of N give lambda.
     lam = K @ (Y.T @ residual) if W.shape[1] else balance
     return x.reshape(c, m), np.asarray(lam), count
 

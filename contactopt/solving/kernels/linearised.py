@@ -94,11 +94,13 @@ class Linearised:
             y[inside] = (P @ full)[unknowns]
             return y
 
+        # The border of the balance: K is the inverse of V' N (rho V), the Schur complement for the rough inverse N.
         border = rho[:, None] * V * inside[:, None]
         Y = np.stack([apply(v) for v in border.T], axis=1) if p else V
         K = np.linalg.pinv(V.T @ Y)
 
         def solve(x: np.ndarray) -> np.ndarray:
+            # First without multipliers, then the multipliers that restore the balance, then their share of dr.
             y = apply(x[:n])
             multipliers = K @ (V.T @ y - x[n:])
             return np.concatenate([y - Y @ multipliers, multipliers])

@@ -62,16 +62,21 @@ class ADMM:
         if start is not None:
             x[:, 0] -= law.opening(x[:, 1:])
         while True:
+            # r minimises the quadratic program with the weight rho on |r - z + x|^2, under the balance.
             right = rho * (z - x) - problem.q
             right[:, 0] -= rho * law.opening(x[:, 1:])
             r, multipliers = system.solve(right, problem.s)
+            # z is the nearest point of the set of forces; over-relaxation mixes r with the old z.
             relaxed, old = OVER * r + (1 - OVER) * z, z
             z = law.nearest(relaxed + x, (relaxed + x)[:, 0])
+            # x sums up the errors of r = z. At the solution -rho x is the velocity u + g n.
             x = x + relaxed - z
             yield z, multipliers
             count += 1
             if count == check:
                 check *= 2
+                # The larger error says which way rho must go: a larger rho lets r = z fall faster, a smaller one the
+                # velocity.
                 primal = float(np.linalg.norm(r - z)) / max(float(np.linalg.norm(z)), 1e-300)
                 moved = (problem.Q @ z.ravel(), problem.q, rho * x)  # what the velocity is the difference of
                 dual = rho * float(np.linalg.norm(z - old)) / max(*(float(np.linalg.norm(m)) for m in moved), 1e-300)

@@ -17,7 +17,7 @@ import scipy.linalg as la
 from scipy.fft import dct, dst, fft, idct, idst
 
 from contactopt.problem import InterfaceProblem
-from contactopt.solving.preconditioners.constants import SOFT, SPLIT
+from contactopt.solving.preconditioners.constants import DISPERSION, SPLIT
 from contactopt.solving.preconditioners.grid import EVEN, Grid, GridMap, GridMaps, cells_along, on_grid
 
 # held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j + shift) / k
@@ -156,7 +156,7 @@ def _root(grid: Grid, component: int) -> tuple[np.ndarray, list[Direction]]:
     root = np.sqrt(squares * np.prod(spacing) ** (2 / len(waves)))
     if 0 < component <= len(waves):
         own = waves[component - 1]
-        root /= 1 - own / total * ((SPLIT if len(waves) == 2 else 0.0) + SOFT * own / 4)
+        root /= 1 - own / total * ((SPLIT if len(waves) == 2 else 0.0) + DISPERSION * own / 4)
     if root.flat[0] <= 1e-6 * root.flat[1]:
         root.flat[0] = np.partition(root.ravel(), 1)[1] / 2
     return root, directions
