@@ -39,7 +39,13 @@ class Fields:
     contact: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def write_vtu(self, path: Path) -> None:
-        """The body as a VTU file with displacement, stress, von Mises stress and contact quantities at the nodes."""
+        """Write the body as a VTU file with displacement, stress, von Mises stress and contact quantities at the nodes.
+
+        Parameters
+        ----------
+        path
+            The file.
+        """
         from skfem.io.meshio import to_meshio
 
         flat = {f"stress_{name}": column for name, column in zip(self.names, self.stress.T)}

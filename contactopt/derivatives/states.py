@@ -98,7 +98,18 @@ class Step:
         return tuple(B.T @ self.solution.reactions.ravel() for B in self.reduction.maps)
 
     def law_change(self, which: Parameter) -> np.ndarray:
-        """Derivative (k,) of the law's parameter by the friction of pairs of surfaces."""
+        """Differentiate the law's parameter by the friction of pairs of surfaces.
+
+        Parameters
+        ----------
+        which
+            The parameter, which names the pairs.
+
+        Returns
+        -------
+        ndarray
+            (k,) derivatives.
+        """
         out, areas = np.zeros(self.problem.contacts), self.problem.areas
         chosen = [pair.name for pair in which.pairs(self.reduction.scene)]
         for pair, made in zip(self.reduction.scene.pairs, self.problem.pairs):
@@ -108,7 +119,20 @@ class Step:
         return out
 
     def loads(self, which: Parameter, number: int) -> tuple[Any, Any, float]:
-        """The scene and the body's part with a load changed by a step, and the step: bodies are affine in their loads."""
+        """Change a load by a step. Bodies are affine in their loads, so that a step of any size gives the derivative.
+
+        Parameters
+        ----------
+        which
+            The parameter that is a load.
+        number
+            The number of the body among the parts of the scene.
+
+        Returns
+        -------
+        tuple
+            The changed scene, the part of it that stands for the body, and the step.
+        """
         scene = self.reduction.scene
         value = which.read(scene)
         step = abs(value) or 1.0
@@ -116,7 +140,20 @@ class Step:
         return changed, changed.parts[number], step
 
     def explicit(self, direction: Direction, base: Reduction) -> Explicit:
-        """What the direction changes; `base` has the materials, whose matrices are kept there."""
+        """Compute what a direction changes at fixed forces and multipliers.
+
+        Parameters
+        ----------
+        direction
+            The parameters that change, and by how much.
+        base
+            The reduction that has the materials, whose matrices are kept there.
+
+        Returns
+        -------
+        Explicit
+            The changes of displacement, balance, law and bodies.
+        """
         problem = self.problem
         du, dmu = np.zeros(problem.q.shape), np.zeros(problem.contacts)
         dU = [np.zeros(len(U)) for U in self.displaced]
@@ -146,7 +183,22 @@ class Step:
         return Explicit(du, np.concatenate(ds), dmu, tuple(dU))
 
     def work(self, which: Parameter, dual: Duals, base: Reduction) -> Any:
-        """The derivative by one parameter from the gradient by the data of the problem."""
+        """Compute the derivative by one parameter from the gradient by the data of the problem.
+
+        Parameters
+        ----------
+        which
+            The parameter.
+        dual
+            The gradient by q, s and mu, and what it is on the bodies.
+        base
+            The reduction that has the materials, whose matrices are kept there.
+
+        Returns
+        -------
+        float or ndarray
+            The derivative; (k,) for a parameter with one number per contact.
+        """
         if which.kind == "gap":
             return dual.q[:, 0]
         if which.kind == "friction":

@@ -69,7 +69,21 @@ class Kernel:
 
     @classmethod
     def of_coefficients(cls, grid: tuple[int, ...], coefficients: Symbols) -> Kernel:
-        """From the coefficients K_ab at distances 0 to M / 2 along each axis, M as `embedding` gives it."""
+        """Make a kernel from its coefficients.
+
+        Parameters
+        ----------
+        grid
+            Number of contacts along each axis.
+        coefficients
+            For each pair of components (a, b) with a <= b the coefficients K_ab at distances 0 to M / 2 along each
+            axis, with M as `embedding` gives it [length / force].
+
+        Returns
+        -------
+        Kernel
+            The kernel.
+        """
         from scipy.fft import rfftn
 
         padded, symbols = embedding(grid), {}
@@ -126,21 +140,27 @@ class Kernel:
         return doubled or periodic
 
     def coarse(self) -> Kernel:
-        """The kernel between pairs (in 2D) or squares of four contacts: a force is spread evenly over them, displacements are means.
+        """Make the kernel between pairs (in 2D) or squares of four contacts.
 
-        Along each axis K_c(I) = (K(2 I - 1) + 2 K(2 I) + K(2 I + 1)) / 4, which is a product with cos^2 followed by the sum over
+        A force is spread evenly over them, and displacements are means. Along each axis
+        K_c(I) = (K(2 I - 1) + 2 K(2 I) + K(2 I + 1)) / 4, which is a product with cos^2 followed by the sum over
         the two frequencies that fall on one.
+
+        Returns
+        -------
+        Kernel
+            The kernel on the grid of half as many contacts along each axis.
         """
         symbols = {}
         for pair, symbol in self.symbols.items():
             odd = _odd_axes(*pair, len(self.grid))
             for axis, size in enumerate(self.padded):
-                halved = axis == len(self.padded) - 1
-                count = size // 2 + 1 if halved else size
+                final = axis == len(self.padded) - 1
+                count = size // 2 + 1 if final else size
                 shape = [count if i == axis else 1 for i in range(symbol.ndim)]
                 weighted = symbol * (np.cos(np.pi * np.arange(count) / size) ** 2).reshape(shape)
-                low = np.take(weighted, range(size // 4 + 1 if halved else size // 2), axis)
-                if halved:  # the frequency k + M / 2 is minus the frequency M / 2 - k
+                low = np.take(weighted, range(size // 4 + 1 if final else size // 2), axis)
+                if final:  # the frequency k + M / 2 is minus the frequency M / 2 - k
                     high = np.take(weighted, range(size // 2, size // 4 - 1, -1), axis)
                     high = _negated(high, axis, odd)
                 else:
@@ -151,7 +171,22 @@ class Kernel:
         return Kernel(tuple(-(-n // 2) for n in self.grid), halved, symbols)
 
     def act(self, x: np.ndarray, rows: tuple[int, ...], columns: tuple[int, ...], single: bool = False) -> np.ndarray:
-        """Displacements (rows, *grid) of the components `rows` under forces x (columns, *grid) of the components `columns`."""
+        """Compute displacements under forces.
+
+        Parameters
+        ----------
+        x
+            (columns, n0[, n1]) forces on the grid [force].
+        rows, columns
+            The components of the displacements and of the forces.
+        single
+            Whether single precision is enough.
+
+        Returns
+        -------
+        ndarray
+            (rows, n0[, n1]) displacements [length].
+        """
         symbols = self.single if single else self.symbols
         spectra = {}
         for b, part in zip(columns, x):
@@ -173,7 +208,18 @@ class Kernel:
         return out
 
     def entries(self) -> np.ndarray:
-        """The operator as an array (k dim, k dim)."""
+        """Write the operator as an array.
+
+        Returns
+        -------
+        ndarray
+            (k dim, k dim) [length / force].
+
+        Raises
+        ------
+        InputError
+            If it would be too large.
+        """
         k, dim = int(np.prod(self.grid)), self.dim
         check_dense(k * dim)
         places = np.indices(self.grid).reshape(len(self.grid), k)

@@ -39,7 +39,18 @@ class Pair:
         return slice(self.start, self.stop)
 
     def unknowns(self, dim: int) -> np.ndarray:
-        """Numbers of the pair's rows in Q."""
+        """Number the pair's rows in Q.
+
+        Parameters
+        ----------
+        dim
+            Number of components of a contact.
+
+        Returns
+        -------
+        ndarray
+            (k_i dim,) numbers of the rows.
+        """
         return np.arange(self.start * dim, self.stop * dim)
 
 

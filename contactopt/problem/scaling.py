@@ -20,9 +20,33 @@ class Scales:
     multipliers: np.ndarray
 
     def to_physical(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Take dimensionless reactions and multipliers to the units of the problem.
+
+        Parameters
+        ----------
+        reactions, multipliers
+            (k, dim) and (p,) of the dimensionless problem.
+
+        Returns
+        -------
+        tuple
+            Both in the units of the problem.
+        """
         return reactions * self.force, multipliers * self.multipliers
 
     def to_dimensionless(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Take reactions and multipliers to the units of the dimensionless problem.
+
+        Parameters
+        ----------
+        reactions, multipliers
+            (k, dim) [force] and (p,) in the units of the problem.
+
+        Returns
+        -------
+        tuple
+            Both without units.
+        """
         return reactions / self.force, multipliers / self.multipliers
 
 

@@ -74,11 +74,33 @@ class Stacked:
         return self._each(operator.mul, -1.0)
 
     def astype(self, kind: Any) -> Stacked:
-        """The vector in another precision."""
+        """Convert the vector to another precision.
+
+        Parameters
+        ----------
+        kind
+            The type of its entries.
+
+        Returns
+        -------
+        Stacked
+            The vector in the same parts.
+        """
         return self._each(lambda part, kind: part.astype(kind), kind)
 
     def dot(self, other: Stacked) -> float:
-        """The scalar product."""
+        """Compute the scalar product with another vector.
+
+        Parameters
+        ----------
+        other
+            A vector in the same parts.
+
+        Returns
+        -------
+        float
+            The sum over all parts.
+        """
         sums = in_turn(_started_dot, self.parts, other.parts)
         return sum(own() for own in sums)
 

@@ -40,7 +40,18 @@ class SceneFile:
     lines: dict[str, int]
 
     def located(self, error: InputError) -> InputError:
-        """The error with the line of the body or contact that it names, if it names one."""
+        """Tell where in the file a mistake is.
+
+        Parameters
+        ----------
+        error
+            An error that may name a body or contact.
+
+        Returns
+        -------
+        InputError
+            The error with the name of the file, and with the line of the body or contact that it names.
+        """
         for name, line in self.lines.items():
             if f"'{name}'" in str(error):
                 return InputError(f"{self.name}, line {line}: {error}")

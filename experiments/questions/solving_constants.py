@@ -20,6 +20,7 @@ from typing import Any  # noqa: E402
 from contactopt import InterfaceProblem, reduce, scenes, solve  # noqa: E402
 from contactopt.solving import constants  # noqa: E402
 from contactopt.solving.methods import find_method  # noqa: E402
+from contactopt.solving.methods.nested import Nested  # noqa: E402
 from experiments.questions.granular import packing  # noqa: E402
 from experiments.questions.robustness import rigid_bodies  # noqa: E402
 from experiments.report import write  # noqa: E402
@@ -60,7 +61,8 @@ USERS = {  # names of constants -> module that uses them, method that is run, ki
     "EIGENVALUE_MARGIN ROWS_FALL ROWS_SHARE FINEST_SHARE STIFFER": ("kernels.mprgp", "lagrangian", ("coarse",)),
     "FIRST_BALANCING MOST_CHANGE LEAST_CHANGE": ("methods.admm", "admm", ("coarse",)),
 }
-BUILT = {"pcg": find_method("alternating", normal="pcg", tangential="pcg")}  # methods with settings
+# methods with settings, or without a name of their own
+BUILT = {"pcg": find_method("alternating", normal="pcg", tangential="pcg"), "nested": Nested()}
 LIMIT = 1000  # iterations per problem
 NEAR_ONE = 0.8  # shares from here to one are changed by their distance from one
 

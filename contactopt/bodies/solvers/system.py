@@ -105,9 +105,17 @@ class BodySolver(Protocol):
         """That block times `load`, which is (m,) or (m, j)."""
 
     def restricted(self, at: np.ndarray) -> Product:
-        """Products with the block of the inverse of A on the unknowns `at` (m,), as a function (load, rtol) -> product.
+        """Prepare products with the block of the inverse of A on some unknowns.
 
-        The function takes loads of shape (m,) or (m, j).
+        Parameters
+        ----------
+        at
+            (m,) the unknowns.
+
+        Returns
+        -------
+        callable
+            A function (load, rtol) of loads (m,) or (m, j) to the product of that shape.
         """
 
 

@@ -44,7 +44,18 @@ class Bonded:
         return dr - self.X @ multipliers, multipliers
 
     def inverse(self, unknowns: np.ndarray) -> np.ndarray:
-        """The columns of G (n, m) for these unknowns (m,). Each is computed once and kept."""
+        """Compute columns of G, the inverse of Q under the balance. Each is computed once and kept.
+
+        Parameters
+        ----------
+        unknowns
+            (m,) numbers of the columns.
+
+        Returns
+        -------
+        ndarray
+            (n, m).
+        """
         new = unknowns[self.place[unknowns] < 0]
         if len(new):
             unit = np.zeros((len(self.V), len(new)))
@@ -57,7 +68,29 @@ class Bonded:
     def step(
         self, rho: np.ndarray, error: np.ndarray, balance: np.ndarray, D: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """dr (k, d), dlambda (p,) of the Newton step that Equations.step takes; LinAlgError if its system is singular."""
+        """Solve for the Newton step that `Equations.step` takes.
+
+        Parameters
+        ----------
+        rho
+            (k,) steps of the map.
+        error
+            (k, d) right-hand side of the contact equations.
+        balance
+            (p,) error of the balance.
+        D
+            (k, d, d) derivatives of the law's map.
+
+        Returns
+        -------
+        tuple
+            dr (k, d) and dlambda (p,).
+
+        Raises
+        ------
+        LinAlgError
+            If the system is singular.
+        """
         k, d = error.shape
         loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))
         N = (loose[:, None] * d + np.arange(d)).ravel()

@@ -28,12 +28,41 @@ Known = tuple[np.ndarray, np.ndarray, Moved]  # the same, and Q r
 
 
 class Method(Protocol):
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]: ...
+    """What every method offers, as the head of this module says."""
+
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]:
+        """Iterate on a dimensionless problem. The driver decides when to stop.
+
+        Parameters
+        ----------
+        problem
+            The dimensionless interface problem.
+        start
+            Reactions (k, dim) and multipliers (p,) to start from; None: a cold start.
+
+        Yields
+        ------
+        tuple
+            Reactions (k, dim), multipliers (p,) and, where the method knows it, Q r as a Moved.
+        """
 
     def backends(self, dim: int) -> tuple[str, str]:
-        """Names of its normal and tangential backend in `dim` dimensions, NATIVE where it needs none.
+        """Name the backends that the method needs.
 
-        Raises InputError if one cannot be used.
+        Parameters
+        ----------
+        dim
+            Number of components of a contact, 2 or 3.
+
+        Returns
+        -------
+        tuple
+            The normal and the tangential backend, NATIVE where it needs none.
+
+        Raises
+        ------
+        InputError
+            If one cannot be used.
         """
 
 
