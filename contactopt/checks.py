@@ -67,7 +67,18 @@ def given(value: Any) -> bool:
 
 
 def check_positive(**sizes: float) -> None:
-    """Raise InputError unless every size is a positive finite number."""
+    """Check that every size is a positive finite number.
+
+    Parameters
+    ----------
+    sizes
+        The values by their names, in which _ stands for a space in the message.
+
+    Raises
+    ------
+    InputError
+        If a size is no number, not finite, or not positive.
+    """
     for name, value in sizes.items():
         check_number(name.replace("_", " "), value, low=0.0)
 
