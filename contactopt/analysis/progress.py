@@ -56,7 +56,20 @@ def progress_lines(say: Callable[[str], None], problem: InterfaceProblem, tol: f
 
 
 def remaining(steps: list[tuple[float, float]], tol: float) -> str:
-    """ ", about T s left" from the last two (seconds, residual); nothing where the residual did not fall or is small enough."""
+    """Say how much time is left, from the last two steps of a solve.
+
+    Parameters
+    ----------
+    steps
+        The seconds spent [s] and the residual after each step.
+    tol
+        The residual at which the solve will end.
+
+    Returns
+    -------
+    str
+        ", about T s left"; nothing where the residual did not fall or is small enough.
+    """
     if len(steps) < 2:
         return ""
     (start, old), (end, new) = steps[-2:]

@@ -104,7 +104,20 @@ def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:
 
 
 def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
-    """For every pair of surfaces the resultant of the contact forces on its upper body."""
+    """Compute for every pair of surfaces the resultant of the contact forces on its upper body.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    dict
+        The resultants by the names of the pairs.
+    """
     forces, points = space_forces(reduction, solution), reduction.problem.coordinates
     ring, planes = reduction.scene.kind == "axisymmetric", planes_of(reduction)
     return {
@@ -114,7 +127,20 @@ def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resul
 
 
 def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
-    """For every support and plate, as "body 'name', support 'boundary'", the resultant of its forces on the body."""
+    """Compute for every support and plate the resultant of its forces on the body.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    dict
+        The resultants by names such as "body 'block', support 'bottom'".
+    """
     ring, planes = reduction.scene.kind == "axisymmetric", planes_of(reduction)
     found = {}
     displaced = reduction.displaced(solution)

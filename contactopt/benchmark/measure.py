@@ -215,5 +215,20 @@ def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, An
 
 
 def associated_residual(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray | None) -> float:
-    """The certificate of the same problem under the associated law."""
+    """Compute the certificate of the same problem under the associated law.
+
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    r
+        (k, dim) contact forces, normal first [force].
+    lam
+        (p,) multipliers; None: those that fit best.
+
+    Returns
+    -------
+    float
+        The natural-map residual [-].
+    """
     return natural_map_residual(replace(problem, law=Associated(problem.mu)), r, lam)

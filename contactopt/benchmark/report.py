@@ -356,7 +356,18 @@ def _png(figure: Any) -> bytes:
 
 
 def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
-    """One HTML page of reports (layout, folder, Markdown). It stands alone and holds no script."""
+    """Make one HTML page of reports. It stands alone and holds no script.
+
+    Parameters
+    ----------
+    bodies
+        Layout, folder and Markdown of each report.
+
+    Returns
+    -------
+    str
+        The HTML.
+    """
     links = "".join(
         f'<li><a href="#{html.escape(layout.name)}">{html.escape(layout.title)}</a></li>' for layout, _, _ in bodies
     )

@@ -180,7 +180,25 @@ class Store:
 
 
 def lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The rows of a rows.jsonl. Lines that are no rows are left out, with a warning: their runs count as not made."""
+    """Read the rows of a rows.jsonl.
+
+    Lines that are no rows are left out, with a warning: their runs count as not made.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Yields
+    ------
+    dict
+        A row.
+
+    Raises
+    ------
+    InputError
+        If a row has a newer schema.
+    """
     bad = 0
     with open(path, "rb") as file:
         for line in file:

@@ -50,7 +50,22 @@ def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFr
 
 
 def success_table(table: pd.DataFrame, by: str = "method", across: str = "setting") -> pd.DataFrame:
-    """Percent of the runs that kept the tolerance; of all, the percent with a right claim; the ways of failing."""
+    """Count the runs that kept the tolerance, those with a right claim, and the ways of failing.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    by
+        The column whose values have a row each.
+    across
+        The column whose values have a column each.
+
+    Returns
+    -------
+    DataFrame
+        Percentages and failures.
+    """
     import pandas as pd
 
     groups(table, across)  # complains if there is no such column
@@ -70,10 +85,24 @@ def success_table(table: pd.DataFrame, by: str = "method", across: str = "settin
 def time_table(
     table: pd.DataFrame, metric: str = "solve_seconds", by: str = "method", across: str = "setting"
 ) -> pd.DataFrame:
-    """Shifted geometric mean of times, a failure counted at its time limit; over the least; median and quartiles [s].
+    """Compute the shifted geometric mean of times, a failure counted at its time limit, with median and quartiles.
 
-    With shift sh = 1 ms: exp(mean(log(t + sh))) - sh. The last column: median over instances of the spread
+    With shift sh = 1 ms it is exp(mean(log(t + sh))) - sh. The last column is the median over instances of the spread
     (largest - least) / median of repeats.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    metric
+        The column with the times [s].
+    by, across
+        The columns whose values have a row each.
+
+    Returns
+    -------
+    DataFrame
+        Times [s], and the mean over the least one.
     """
     import pandas as pd
 

@@ -81,10 +81,20 @@ def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
 
 
 def neighbours(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of balls (centres (dim, n), radii (n,)) of two sets that may face each other.
+    """Find the pairs of balls of two sets that may face each other.
 
-    Balls are apart by at most twice the distance of the nearest ones, so that surfaces with a gap find each other. Those
-    of b are searched by size, each octave in a tree of its own: graded meshes need no more pairs than even ones.
+    Balls are apart by at most twice the distance of the nearest ones, so that surfaces with a gap find each other.
+    Those of b are searched by size, each octave in a tree of its own: graded meshes need no more pairs than even ones.
+
+    Parameters
+    ----------
+    a, b
+        Centres (dim, n) and radii (n,) of the balls of each set [length].
+
+    Returns
+    -------
+    tuple
+        The numbers (j,) of the balls of a and of b in each pair.
     """
     (x, r), (y, s) = a, b
     octave = np.floor(np.log2(s / s.max()))

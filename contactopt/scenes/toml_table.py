@@ -156,7 +156,18 @@ def read_table(path: Path) -> Table:
 
 
 def lines_of(text: str) -> dict[Place, int]:
-    """Place of every entry of a valid TOML text -> its line, from 1."""
+    """Find the lines of the entries of a TOML text.
+
+    Parameters
+    ----------
+    text
+        A valid text.
+
+    Returns
+    -------
+    dict
+        For the place of every entry its line, from 1.
+    """
     tokens, line = [], 1
     for match in TOKEN.finditer(text):
         if match.lastgroup != "space":

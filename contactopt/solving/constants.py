@@ -101,6 +101,7 @@ ROWS_FALL = 0.3  # factor by which the error of the rows should fall in one step
 ROWS_SHARE = 0.1  # accuracy of an inner solve, over the penalty times the error of the rows
 FINEST_SHARE = 1e-3  # and the finest, over the accuracy that is asked for
 STIFFER = 4  # factor by which the penalty grows
+ROUGH_NORMAL = 1e-4  # accuracy of the normal problem of `lagrangian` before its active set steps
 
 # The balancing of rho (contactopt.solving.methods.admm).
 FIRST_BALANCING = 10  # iteration of the first one; each further one comes after twice as many

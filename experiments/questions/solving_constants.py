@@ -59,6 +59,7 @@ USERS = {  # names of constants -> module that uses them, method that is run, ki
         ("half-spaces",),
     ),
     "EIGENVALUE_MARGIN ROWS_FALL ROWS_SHARE FINEST_SHARE STIFFER": ("kernels.mprgp", "lagrangian", ("coarse",)),
+    "ROUGH_NORMAL": ("methods.lagrangian", "lagrangian", ("coarse",)),
     "FIRST_BALANCING MOST_CHANGE LEAST_CHANGE": ("methods.admm", "admm", ("coarse",)),
 }
 # methods with settings, or without a name of their own

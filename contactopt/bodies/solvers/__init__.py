@@ -111,10 +111,24 @@ def factors_of(name: str, dim: int) -> str:
 
 
 def choose(n: int, dim: int, pardiso: bool = False) -> str:
-    """Name of the cheapest solver for n unknowns in `dim` dimensions; `pardiso` says whether it is installed.
+    """Choose the cheapest solver of a body.
 
-    Sparse factors have about n log n entries in the plane and n^(4/3) in space, and take n^(3/2) and n^2 operations. The
-    work and the memory of multigrid grow with n. The limits stand in contactopt.bodies.solvers.constants.
+    Sparse factors have about n log n entries in the plane and n^(4/3) in space, and take n^(3/2) and n^2 operations.
+    The work and the memory of multigrid grow with n. The limits stand in contactopt.bodies.solvers.constants.
+
+    Parameters
+    ----------
+    n
+        Number of unknowns of the body.
+    dim
+        Number of its dimensions, 2 or 3.
+    pardiso
+        Whether PARDISO is installed.
+
+    Returns
+    -------
+    str
+        A name in SOLVERS.
     """
     if dim == 2 or n <= PARDISO_FROM:
         return "superlu"

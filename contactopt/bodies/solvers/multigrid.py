@@ -186,13 +186,30 @@ class Answer(NamedTuple):
 
 
 def conjugate_gradients(A: SparseProduct | BlockProduct, cycle: VCycle, load: np.ndarray, rtol: float) -> Answer:
-    """Solution of A x = load by conjugate gradients with a V-cycle.
+    """Solve A x = load by conjugate gradients with a V-cycle B.
 
-    It ends where (r' B r)^1/2, r the residual, has fallen by `rtol`.
+    It ends where (r' B r)^1/2, with the residual r, has fallen by `rtol`.
+
+    Parameters
+    ----------
+    A
+        Products with the matrix (n, n).
+    cycle
+        The V-cycle.
+    load
+        (n,) right-hand side [force].
+    rtol
+        Relative accuracy in the energy norm.
+
+    Returns
+    -------
+    Answer
+        The solution (n,) [length] and the number of iterations.
 
     Raises
     ------
-    BackendError : if it does not get there within MOST_ITERATIONS iterations, or r' B r is negative or not a number.
+    BackendError
+        If it does not get there within MOST_ITERATIONS iterations, or r' B r is negative or not a number.
     """
     r = np.array(load, dtype=float)
     x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
@@ -238,9 +255,21 @@ def _coarsen(A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray) -> tuple[s
 
 
 def near_neighbours(A: sp.bsr_matrix, points: np.ndarray) -> sp.csr_matrix:
-    """Neighbours in the graph of A at no more than NEAR times the distance of the nearest one, and each node itself.
+    """Find neighbours in the graph of A at no more than NEAR times the distance of the nearest one.
 
     The nearest neighbour of either node counts, so that the pattern is symmetric.
+
+    Parameters
+    ----------
+    A
+        Matrix in blocks of the k nodes.
+    points
+        (dim, k) places of the nodes [length].
+
+    Returns
+    -------
+    csr_matrix
+        (k, k) pattern of ones. Each node is its own neighbour.
     """
     count = points.shape[1]
     row, column = np.repeat(np.arange(count), np.diff(A.indptr)), A.indices

@@ -24,7 +24,7 @@ FIRST = KRYLOV_FIRST  # also of the bonded solution
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
 
 LEAST_REACH = 1e-12  # of a multiplier's column of V, which is dimensionless
-HELD = 1e-8  # share of its motion that the glued contacts must feel of every multiplier
+LEAST_FELT = 1e-8  # share of its motion that the glued contacts must feel of every multiplier
 
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
 # equations, error, balance, D, relative accuracy -> dr, dlambda or None
@@ -283,9 +283,9 @@ def _determined(problem: InterfaceProblem, closed: np.ndarray) -> bool:
     """Whether the glued contacts hold every motion that all of them hold."""
     V = sp.csr_array(problem.V)
     near = V[np.repeat(closed, problem.dim)]
-    whole, held = (V.T @ V).toarray(), (near.T @ near).toarray()
+    whole, felt = (V.T @ V).toarray(), (near.T @ near).toarray()
     try:
-        return bool(la.eigh(held, whole, eigvals_only=True, subset_by_index=[0, 0])[0] > HELD)
+        return bool(la.eigh(felt, whole, eigvals_only=True, subset_by_index=[0, 0])[0] > LEAST_FELT)
     except la.LinAlgError:
         return False
 

@@ -210,7 +210,22 @@ def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
 
 
 def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN_BALANCE) -> Stacked:
-    """Displacements X close to A^-1 T' r, by conjugate gradients with V-cycles."""
+    """Compute displacements close to A^-1 T' r, by conjugate gradients with V-cycles.
+
+    Parameters
+    ----------
+    form
+        Q before condensation.
+    r
+        (k, dim) contact forces.
+    rtol
+        Relative accuracy in the energy norm.
+
+    Returns
+    -------
+    Stacked
+        Displacements X of the bodies.
+    """
     # Conjugate gradients on A X = T' r with B, one V-cycle, as preconditioner; `size` is the energy residual' B
     # residual.
     residual = form.pulled(r.ravel())

@@ -74,7 +74,18 @@ def largest_eigenvalue(P: np.ndarray, steps: int = 10) -> float:
 
 
 def projected_gradient(x: np.ndarray, g: np.ndarray, low: np.ndarray) -> np.ndarray:
-    """Gradient g where x is free, its negative part where x is at its bound; zero exactly at the solution."""
+    """Compute the projected gradient, which is zero exactly at the solution.
+
+    Parameters
+    ----------
+    x, g, low
+        (n,) point, gradient there, and lower bounds.
+
+    Returns
+    -------
+    ndarray
+        (n,) the gradient where x is free, its negative part where x is at its bound.
+    """
     return np.where(x > low, g, np.minimum(g, 0))
 
 
@@ -184,11 +195,28 @@ def box_qp(
     tol: float = 1e-10,
     max_iterations: int = 10_000,
 ) -> BoxResult:
-    """The same problem as `mprgp`, in less time where P does not fit the processor's cache (reports/dense_speed).
+    """Solve the same problem as `mprgp`, in less time where P does not fit the processor's cache (reports/dense_speed).
 
     Iterative refinement: the correction d of x minimises d'Pd/2 + (P x + c)'d, d >= low - x, in single precision to a
-    few digits, scaled so that no digit is lost; its gradient is taken anew in double precision. Ends in double
-    precision if P is too ill-conditioned for that. P must be an array of float64.
+    few digits, scaled so that no digit is lost; its gradient is taken anew in double precision. It ends in double
+    precision if P is too ill-conditioned for that.
+
+    Parameters
+    ----------
+    P
+        (n, n) symmetric positive semidefinite array of float64.
+    c, low, start, tol, max_iterations
+        As for `mprgp`.
+
+    Returns
+    -------
+    BoxResult
+        The solution, without multipliers.
+
+    Raises
+    ------
+    InputError
+        On shapes that do not fit.
     """
     _check(P, c, low)
     x, target = _start(c, low, start), tol * float(np.linalg.norm(c))

@@ -89,11 +89,28 @@ def _accelerate(
 def disc_qp(
     Q: np.ndarray, c: np.ndarray, radius: np.ndarray, start: np.ndarray | None = None, tol: float = 1e-10
 ) -> tuple[np.ndarray, bool]:
-    """min t'Qt/2 + c't subject to |t_i| <= radius_i, the tangential problem (paper, eq (22)), natively.
+    """Solve min t'Qt/2 + c't subject to |t_i| <= radius_i, the tangential problem (paper, eq (22)), natively.
 
-    Q (k d, k d) symmetric positive semidefinite, c (k, d), radius (k,) >= 0. Returns t (k, d) and whether the natural
-    map |t - P(t - step (Q t + c))| is at most tol max(|t|, step |c|). In rounds: the gradient is taken in double
-    precision at the start of a round and its change in single precision, which halves the memory traffic.
+    In rounds: the gradient is taken in double precision at the start of a round and its change in single precision,
+    which halves the memory traffic.
+
+    Parameters
+    ----------
+    Q
+        (k d, k d) symmetric positive semidefinite array.
+    c
+        (k, d) linear term.
+    radius
+        (k,) bounds, at least 0.
+    start
+        (k, d) point to start from; None: zero.
+    tol
+        Bound of the natural map |t - P(t - step (Q t + c))| over max(|t|, step |c|).
+
+    Returns
+    -------
+    tuple
+        t (k, d), and whether it meets the tolerance.
     """
     single, none = Q.astype(np.float32), np.zeros(0)
     step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(single) or 1.0)

@@ -62,7 +62,20 @@ class Lemke:
 def complementarity_problem(
     problem: InterfaceProblem, copositive: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M (m, m), q (m,), C (2k, c) of the LCP  0 <= z, M z + q >= 0, z'(M z + q) = 0;  r = C z[:c], lambda last in z."""
+    """Write a problem in 2D as an LCP  0 <= z, M z + q >= 0, z'(M z + q) = 0;  r = C z[:c], lambda last in z.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of k contacts under Coulomb's law.
+    copositive
+        Whether the form with 4 k unknowns is written, whose matrix is copositive.
+
+    Returns
+    -------
+    tuple
+        M (m, m), q (m,) and C (2 k, c).
+    """
     k, p = problem.contacts, len(problem.s)
     normal, tangent, eye = np.eye(2 * k)[:, ::2], np.eye(2 * k)[:, 1::2], np.eye(k)
     if copositive:

@@ -259,6 +259,19 @@ def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> Linear
 
 
 def selection(n: int, unknowns: np.ndarray) -> sp.csr_matrix:
-    """U (n, m) whose columns are the unit vectors of these unknowns (m,)."""
+    """Write the matrix whose columns are the unit vectors of some unknowns.
+
+    Parameters
+    ----------
+    n
+        Number of all unknowns.
+    unknowns
+        (m,) the chosen ones.
+
+    Returns
+    -------
+    csr_matrix
+        U (n, m).
+    """
     m = len(unknowns)
     return sp.csr_matrix((np.ones(m), (unknowns, np.arange(m))), (n, m))

@@ -14,9 +14,19 @@ INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes
 
 
 def seminorm(m: float) -> np.ndarray:
-    """First column (2m,) of the sparse circulant matrix of the H^1/2 seminorm, eq (27); about log2 m entries.
+    """Compute the first column of the sparse circulant matrix of the H^1/2 seminorm, eq (27).
 
-    Its rows sum to zero where m is a power of two: constants are the kernel of a seminorm.
+    It has about log2 m entries. Its rows sum to zero where m is a power of two: constants are the kernel of a seminorm.
+
+    Parameters
+    ----------
+    m
+        Half the number of nodes of the closed curve.
+
+    Returns
+    -------
+    ndarray
+        (2 m,) column.
     """
     column, top = np.zeros(round(2 * m)), int(np.ceil(np.log2(m)))
     column[0] = 2 * np.sum(1 / np.arange(1, 2**top) ** 2.0)
@@ -28,7 +38,20 @@ def seminorm(m: float) -> np.ndarray:
 
 
 def norm(m: float, h: float) -> np.ndarray:
-    """First column (2m,) of the circulant matrix of the H^1 norm, eq (28)."""
+    """Compute the first column of the circulant matrix of the H^1 norm, eq (28).
+
+    Parameters
+    ----------
+    m
+        Half the number of nodes of the closed curve.
+    h
+        The distance of two nodes.
+
+    Returns
+    -------
+    ndarray
+        (2 m,) column.
+    """
     column = np.zeros(round(2 * m))
     column[0], column[[1, -1]] = 2 / h + h, -1 / h
     return column
@@ -143,12 +166,38 @@ def _circular(symbol: np.ndarray) -> GridMap:
 
 
 def closed_curve(k: int) -> int:
-    """Half the number of nodes of the closed curve: a power of two, at least k."""
+    """Choose half the number of nodes of the closed curve.
+
+    Parameters
+    ----------
+    k
+        Number of contacts.
+
+    Returns
+    -------
+    int
+        A power of two, at least k.
+    """
     return int(2 ** np.ceil(np.log2(k)))
 
 
 def restricted_circulant(symbol: np.ndarray, k: int, axis: int) -> GridMap:
-    """E' C E along one axis of k nodes for the circulant matrix with that (real, symmetric) symbol."""
+    """Make the product E' C E along one axis of k nodes, for a circulant matrix C and the extension E by zero.
+
+    Parameters
+    ----------
+    symbol
+        (m + 1,) eigenvalues of C, which is real and symmetric, of size 2 m.
+    k
+        Number of nodes along the axis.
+    axis
+        The axis of the grid.
+
+    Returns
+    -------
+    callable
+        The product on arrays on the grid.
+    """
     n = 2 * (len(symbol) - 1)
 
     def product(X: np.ndarray) -> np.ndarray:
