@@ -72,7 +72,7 @@ def fields_of(body: Assembly, U: np.ndarray) -> Fields:
         Displacement, stress and von Mises stress at the vertices of the mesh.
     """
     basis = body.basis
-    stress = _nodal_stress(body, U)
+    stress = nodal_stress(body, U)
     full = np.stack([stress[i, j] for i, j in PLACES[len(body.unknowns)]], axis=1)
     mean = np.trace(stress) / 3
     deviator = stress - mean * np.eye(3)[:, :, None]
@@ -80,7 +80,7 @@ def fields_of(body: Assembly, U: np.ndarray) -> Fields:
     return Fields(body.name, straight(basis.mesh), STRESSES[body.kind], U[basis.nodal_dofs], full, von_mises)
 
 
-def _nodal_stress(body: Assembly, U: np.ndarray) -> np.ndarray:
+def nodal_stress(body: Assembly, U: np.ndarray) -> np.ndarray:
     """Stress tensor (3, 3, n) at the vertices of the mesh, averaged over the elements with their volumes.
 
     An element counts with its mean stress where the displacement is linear, with its stress at the vertex where it is
@@ -89,12 +89,12 @@ def _nodal_stress(body: Assembly, U: np.ndarray) -> np.ndarray:
     basis, mesh = body.basis, body.basis.mesh
     volume = basis.dx.sum(axis=1)
     if body.degree == 1:
-        element = np.sum(_stress_in(body, basis, U) * basis.dx, axis=3) / volume
+        element = np.sum(stress_in(body, basis, U) * basis.dx, axis=3) / volume
         values = np.repeat(element[..., None], len(mesh.t), axis=3)
     else:
         corners = SHAPES[mesh.refdom.__name__][1][1].doflocs.T
         places = skfem.Basis(mesh, basis.elem, quadrature=(corners, np.ones(corners.shape[1])))
-        values = _stress_in(body, places, U)
+        values = stress_in(body, places, U)
     vertices, count = mesh.t.T.ravel(), int(mesh.nvertices)
     weight = np.bincount(vertices, np.repeat(volume, len(mesh.t)), count)
     total = np.zeros((3, 3, count))
@@ -131,10 +131,10 @@ def recovery_error(body: Assembly, U: np.ndarray, W: np.ndarray) -> np.ndarray:
     vertices = skfem.Basis(mesh, shape, quadrature=(basis.X, basis.W))
     first, second = (
         sum(
-            _nodal_stress(body, field)[:, :, mesh.t[i]][..., None] * np.asarray(vertices.basis[i][0])
+            nodal_stress(body, field)[:, :, mesh.t[i]][..., None] * np.asarray(vertices.basis[i][0])
             for i in range(len(mesh.t))
         )
-        - _stress_in(body, basis, field)
+        - stress_in(body, basis, field)
         for field in (U, W)
     )
     E, nu = body.material.E, body.material.nu
@@ -144,7 +144,7 @@ def recovery_error(body: Assembly, U: np.ndarray, W: np.ndarray) -> np.ndarray:
     return np.asarray(np.sum(density * basis.dx * weight, axis=1))
 
 
-def _stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
+def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
     """Stress tensor (3, 3, elements, points) at the quadrature points of a basis of the body."""
     lam, shear = lame(body.material)
     field = basis.interpolate(U)
