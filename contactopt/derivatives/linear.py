@@ -21,6 +21,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, gmres, splu
 
+from contactopt.derivatives.constants import INNER, ROUND
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.coupled import CoupledForm
@@ -35,9 +36,8 @@ from contactopt.solving.preconditioners import Preconditioner
 
 SINGULAR = 1e-13  # reciprocal condition of K below which it counts as singular
 ACCURACY = 1e-11  # relative residual of an iterative solve
-ROUND, INNER = 1e-4, 1e-6  # reduction of the residual by one round of GMRES, and by GMRES for the model of Q
-ROUNDS = 12
-RESTART, CYCLES = 60, 3
+ROUNDS = 12  # of GMRES, which gain four digits each
+RESTART, CYCLES = 60, 3  # of GMRES
 UNIQUE = (
     "the solution has no derivative, because its linear system is singular: forces or motions are not unique there; remove "
     "redundant contacts, or hold the bodies."
