@@ -51,7 +51,20 @@ class SymmetryPlane:
     offset: float
 
     def contains(self, points: np.ndarray, size: float) -> np.ndarray:
-        """Mask of the points (dim, k) that lie in the plane."""
+        """Tell which points lie in the plane.
+
+        Parameters
+        ----------
+        points
+            (dim, k) points [length].
+        size
+            The size of the contact surface, beside which rounding is zero [length].
+
+        Returns
+        -------
+        ndarray
+            (k,) mask.
+        """
         return np.asarray(np.abs(self.inward @ points - self.offset) <= NEAR * size)
 
 

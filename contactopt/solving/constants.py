@@ -91,7 +91,8 @@ LEAST_SYMBOL = 1e-3  # value of the symbol that is inverted, over its median
 LEAST_DETERMINANT = 0.1  # of the two tangential symbols, over their product
 FIRST_SHIFT, SHIFT_RATIO = 0.5, 32.0  # where the shifts of slipping contacts begin to grow, and by how much
 
-# Conjugate gradients with bounds (contactopt.solving.kernels.mprgp).
+# Conjugate gradients with bounds (contactopt.solving.kernels.mprgp). What single precision is worth shows
+# `python -m experiments.questions.dense_speed`.
 EIGENVALUE_MARGIN = 1.1  # on the estimate of the largest eigenvalue, which power steps approach from below
 SINGLE_ACCURACY = 1e-4  # relative accuracy asked of one round in single precision
 SINGLE_STEPS = 300  # of one round
