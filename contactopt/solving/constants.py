@@ -63,7 +63,7 @@ BACKTRACK = 0.8  # factor by which a step is shortened until it is so
 KRYLOV_FIRST = 1e-2  # accuracy of the first step
 KRYLOV_LOOSEST, KRYLOV_TIGHTEST = 0.1, 1e-4  # bounds of the accuracy of the others
 PRODUCT_SHARE = 0.05  # accuracy of products, over that of the step
-MODEL_STEP = 1e-3  # accuracy of the same step for the model of Q, which costs next to nothing
+MODEL_STEP = 1e-3  # accuracy of the same step for the model of Q, over that of the step; it costs next to nothing
 MODEL_PRODUCTS = 1e-4  # accuracy of the products that make the model
 SLIPPING = 0.5  # diagonal entries of D below this count as zero where only a rough inverse is asked for
 

@@ -92,6 +92,7 @@ class Bonded:
             If the system is singular.
         """
         k, d = error.shape
+        # N, the unknowns of the contacts that are open or slip. The right-hand side of those that stick is error / rho.
         loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))
         N = (loose[:, None] * d + np.arange(d)).ravel()
         z = (error / rho[:, None]).ravel()
@@ -99,6 +100,7 @@ class Bonded:
         dr, multipliers = self.solve(z, balance)
         # So far every contact sticks. The others correct that by their displacements z_N.
         if len(N):
+            # With dr = (bonded dr) + G z_N their rows (I - D) dr + rho D z = error are a small dense system for z_N.
             G = self.inverse(N)
             keep = np.eye(d) - D[loose]
 

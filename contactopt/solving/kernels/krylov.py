@@ -154,6 +154,7 @@ def _symmetric_step(
 def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
     """U (k d, m) with the eigenvectors of all D whose eigenvalues delta (m,) are positive, and rho (m,) of each."""
     k, d = D.shape[:2]
+    # The eigenvectors of each contact's D become columns of U, which touch the rows of that contact only.
     values, vectors = np.linalg.eigh(D)
     contact, which = np.nonzero(values > FLAT)
     columns = vectors[contact, :, which]  # (m, d)

@@ -58,6 +58,8 @@ class SparseBlocks:
 
     def __init__(self, Q: sp.csr_array, d: int):
         self.Q, self.d, self.k = Q, d, Q.shape[0] // d
+        # Every entry belongs to the block of its row's and its column's contact. Blocks are numbered row by row, and
+        # every diagonal block is there, because something will be added to it.
         entries = sp.coo_array(Q)
         i, j = (index.astype(np.int64) for index in entries.coords)
         own = np.arange(self.k)
@@ -72,9 +74,11 @@ class SparseBlocks:
     def _arranged(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """The unknowns in an order of elimination of least degree, and the entries by compressed columns of that order."""
         d, n = self.d, self.d * self.k
+        # SuperLU finds the order on a matrix of the same pattern with so large a diagonal that nothing is pivoted.
         size = float(np.abs(self.Q.data).max(initial=0.0)) or 1.0
         safe = sp.csc_array(abs(self.Q) + sp.diags_array(np.full(n, 2 * size * self.k)))  # pivots are on the diagonal
         place = splu(safe, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).perm_c
+        # Row and column of every entry of every block in that order, sorted as compressed columns want them.
         local = np.arange(d)
         row = place[np.broadcast_to((self.rows[:, None] * d + local)[:, :, None], self.blocks.shape)].ravel()
         column = place[np.broadcast_to((self.columns[:, None] * d + local)[:, None, :], self.blocks.shape)].ravel()
@@ -85,6 +89,7 @@ class SparseBlocks:
         """As DenseBlocks.factor."""
         blocks = self.blocks.copy() if left is None else left[self.rows] @ self.blocks
         blocks[self.home] += added
+        # Take the entries by columns, and leave out the unknowns that are not kept.
         values, row, column = blocks.ravel()[self.order], self.row, self.column
         stays = kept[self.unknown]  # in the order of elimination
         m = int(stays.sum())
