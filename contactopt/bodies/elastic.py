@@ -281,7 +281,7 @@ class AssembledElastic:
         raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
 
     def prepare(self, solver: str, entries: bool) -> ElasticBody:
-        return _condense(self.body, solver, entries)
+        return condense(self.body, solver, entries)
 
 
 def _trace(weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray) -> sp.csr_matrix:
@@ -323,7 +323,7 @@ def assemble_elastic(scene: Scene, part: Part, elements: int, zone: float | None
     return AssembledElastic(build_body(scene, part, elements, zone), part)
 
 
-def _condense(body: Assembly, solver: str = "auto", entries: bool = True) -> ElasticBody:
+def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> ElasticBody:
     """Make one body's linear system solvable and condense its plates.
 
     Parameters
@@ -335,6 +335,11 @@ def _condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Ela
     entries
         Whether to eliminate the contact unknowns last, so that the factors hold their Schur complement: this makes the
         entries of the compliance cheap, and serves an explicit Q.
+
+    Returns
+    -------
+    ElasticBody
+        The body, which moves under contact forces.
     """
     # The free unknowns without the fixing ones, with node and component of each, and those of the contact surfaces.
     dofs, n = body.unknowns, len(body.load)
