@@ -128,19 +128,29 @@ def refine(
 ) -> tuple[Mesh, Estimate]:
     """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
 
-    It ends short of the target, with a sentence in the estimate, where the quantity does not converge, where the next mesh
-    would have more than MOST_UNKNOWNS unknowns or take more than MOST_MEMORY bytes, or where a solve fails.
+    It ends short of the target, with a sentence in the estimate, where the quantity does not converge, where the next
+    mesh would have more than MOST_UNKNOWNS unknowns or take more than MOST_MEMORY bytes, or where a solve fails.
 
     Parameters
     ----------
-    states : the scene, or the states of its load path
-    quantity : a name in QUANTITIES; of one of several pairs of surfaces 'NAME:PAIR', such as 'pressure:block-floor'
-    accuracy : bound on the estimated relative error of the quantity, between 0 and 1
-    options : how each mesh is solved
+    states
+        The scene, or the states of its load path.
+    quantity
+        A name in QUANTITIES; of one of several pairs of surfaces 'NAME:PAIR', such as 'pressure:block-floor'.
+    accuracy
+        Bound on the estimated relative error of the quantity, between 0 and 1.
+    options
+        How each mesh is solved.
+
+    Returns
+    -------
+    tuple
+        The finest Mesh with its solution, and the Estimate with the history of the search.
 
     Raises
     ------
-    InputError : for an unknown quantity or an accuracy out of range
+    InputError
+        For an unknown quantity or pair of surfaces, or an accuracy out of range.
     """
     options = options or Options()
     name, _, pair = quantity.partition(":") if isinstance(quantity, str) else (quantity, "", "")

@@ -98,7 +98,18 @@ class PathResult:
         return replace(self.states[-1].solution, seconds=dict(seconds))
 
     def problem(self, step: int) -> InterfaceProblem:
-        """The static problem of one step, which its solution is certified against."""
+        """Make the static problem of one step, which its solution is certified against.
+
+        Parameters
+        ----------
+        step
+            The number of the state, from 0 on.
+
+        Returns
+        -------
+        InterfaceProblem
+            The problem with the gaps and resultants of that state.
+        """
         return replace(self.reduction.problem, q=self.states[step].q, s=self.states[step].s)
 
     @cached_property
@@ -124,9 +135,19 @@ class PathResult:
         return history
 
     def write(self, out: str | Path) -> None:
-        """history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and displacements (n, k, dim).
+        """Write history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and displacements (n, k, dim).
 
-        It also has the bounds of the friction forces (n, k) and the status (n, k): 0 open, 1 stick, 2 slip.
+        The latter also has the bounds of the friction forces (n, k) and the status (n, k): 0 open, 1 stick, 2 slip.
+
+        Parameters
+        ----------
+        out
+            The folder, which is made if it does not exist.
+
+        Raises
+        ------
+        InputError
+            Where the files cannot be written.
         """
         problem = self.reduction.problem
         forces = [state.solution.reactions for state in self.states]
@@ -178,10 +199,10 @@ def follow(
     if not isinstance(scenes, Iterable) or isinstance(scenes, np.ndarray) or sp.issparse(scenes):
         raise InputError(f"a path is a list of scenes; got {type(scenes).__name__}.")
     method, tol = settings.pop("method", None), settings.pop("tol", 1e-8)
-    return follow_states(scenes, elements, zone, Options(Q, solver, method, tol, settings, note))
+    return _follow_states(scenes, elements, zone, Options(Q, solver, method, tol, settings, note))
 
 
-def follow_states(
+def _follow_states(
     scenes: Iterable[Scene], elements: int | None = None, zone: float | None = None, options: Options | None = None
 ) -> PathResult:
     """As follow(), with the options of contactopt.analysis.solve_scene."""
@@ -228,7 +249,7 @@ def solve_states(
     """
     if len(states) == 1:
         return solve_zone(states[0], elements, options, start)
-    path = follow_states(states, elements, None, options)
+    path = _follow_states(states, elements, None, options)
     return Solved(path.reduction, path.solution, path=path)
 
 

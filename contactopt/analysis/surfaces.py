@@ -62,7 +62,20 @@ class ContactFields:
 
 
 def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFields, ...]:
-    """The fields of every pair of surfaces."""
+    """Collect the contact quantities on the surface of every pair.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    tuple
+        The ContactFields of each pair, in the order of the pairs.
+    """
     problem, r = reduction.problem, solution.reactions
     u, areas = problem.displacements(r, solution.multipliers), problem.areas
     share = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)  # the contact on an axis has no area
@@ -90,9 +103,23 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
 def on_nodes(
     reduction: Reduction, fields: tuple[Fields, ...], surfaces: tuple[ContactFields, ...]
 ) -> tuple[Fields, ...]:
-    """The fields of the bodies with the contact quantities at the nodes of their contact surfaces, zero elsewhere.
+    """Put the contact quantities on the nodes of the bodies' contact surfaces. They are zero at all other nodes.
 
-    A node takes the values of the contact nearest to it; traction and slip of a lower body have the opposite sign.
+    A node takes the values of the contact nearest to it. Traction and slip of a lower body have the opposite sign.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    fields
+        The displacements and stresses of the bodies.
+    surfaces
+        The contact quantities of each pair, as `contact_fields` gives them.
+
+    Returns
+    -------
+    tuple
+        The fields of the bodies with the contact quantities added.
     """
     default = {part.name: part.contact for part in reduction.scene.parts if isinstance(part, Part)}
     made = []

@@ -39,12 +39,27 @@ def speed_accuracy(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Time against certified residual: per method a line through its settings, medians over problems and repeats.
+    """Draw time against certified residual: per method a line through its settings, medians over problems and repeats.
 
-    Filled: at least half of the runs kept the tolerance. The Pareto front, where nothing is both faster and more accurate,
-    is drawn in grey. A residual below FLOOR of its tolerance is drawn at FLOOR. Labels stand where the lines end, too.
+    Filled: at least half of the runs kept the tolerance. The Pareto front, where nothing is both faster and more
+    accurate, is drawn in grey. A residual below FLOOR of its tolerance is drawn at FLOOR. Labels stand where the lines
+    end, too.
 
-    labels  name of a method -> the short label that it gets
+    Parameters
+    ----------
+    table
+        The rows.
+    time
+        The column with the times [s].
+    by
+        The column whose values have a line each.
+    labels
+        Short labels by the names of methods.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
     """
     figure, ax = make_figure()
     points, ends = [], []
@@ -88,9 +103,27 @@ def performance_profile(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Dolan-More profile: share of the instances solved within a factor of the best method's time on each.
+    """Draw a profile: the share of the instances solved within a factor of the best method's time on each.
 
-    An instance is a problem at a setting and start; medians over repeats, and a method that fails once has failed.
+    An instance is a problem at a setting and start. Times are medians over repeats, and a method that fails once has
+    failed.
+
+    Source: Dolan, More (2002), Benchmarking optimization software with performance profiles, Math. Program. 91,
+    201-213.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    metric
+        The column with the times [s].
+    by, labels
+        As for `speed_accuracy`.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
     """
     figure, ax = make_figure()
     times = table[metric].where(table["success"], np.inf)
@@ -131,7 +164,24 @@ def time_against_size(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Median time of successful runs against size, with the exponent p of time ~ size^p from the larger half of the sizes."""
+    """Draw the median time of successful runs against size, with the exponent p of time ~ size^p from the larger sizes.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    size
+        The column with the sizes.
+    metric
+        The column with the times [s].
+    by, labels
+        As for `speed_accuracy`.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
+    """
     figure, ax = make_figure()
     ends = []
     look = {name: style for (name, _), style in zip(groups(table, by), styles())}
@@ -150,7 +200,18 @@ def time_against_size(
 
 
 def fitted_exponent(x: np.ndarray, y: np.ndarray) -> float:
-    """p of y ~ x^p by least squares over the larger half of the sizes, three at least; nan with fewer."""
+    """Fit the exponent p of y ~ x^p by least squares over the larger half of the sizes, three at least.
+
+    Parameters
+    ----------
+    x, y
+        (n,) sizes and times.
+
+    Returns
+    -------
+    float
+        The exponent; nan with fewer than three sizes.
+    """
     if len(x) < 3:
         return np.nan
     order = np.argsort(x)[-max(3, (len(x) + 1) // 2) :]
@@ -164,14 +225,29 @@ def stability_map(
     value: str = "success",
     by: str = "method",
 ) -> Any:
-    """One panel per method: success, iterations, error or time over two parameters; hatched grey where no run succeeded.
+    """Draw one panel per method: success, iterations, error or time over two parameters; hatched grey where no run
+    succeeded.
 
-    The cells hold their numbers, unless a map has more than CELLS of them.
+    The cells hold their numbers, unless a map has more than CELLS of them. Runs that ended by the method's own
+    criterion above the tolerance ("settled") show their value too. Where one axis is the friction coefficient and the
+    experiment diagnosed its problems, lines on top: below the dashed one the alternating iteration contracts for every
+    load, at the full one it does not for some load.
 
-    Runs that ended by the method's own criterion above the tolerance ("settled") show their value too.
+    Parameters
+    ----------
+    table
+        The rows.
+    x, y
+        The columns of the two parameters.
+    value
+        The column that is shown.
+    by
+        The column whose values have a panel each.
 
-    Where one axis is the friction coefficient and the experiment diagnosed its problems, lines on top: below the dashed one
-    the alternating iteration contracts for every load, at the full one it does not for some load.
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
     """
     from matplotlib.colors import LogNorm, Normalize
 
@@ -242,7 +318,27 @@ def convergence(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Natural-map residual after each outer iteration, or against `x` = "seconds"; the first repeat of each method."""
+    """Draw the natural-map residual after each outer iteration, or against time, of the first repeat of each method.
+
+    Parameters
+    ----------
+    table
+        The rows, with their histories.
+    x
+        "iterations" or "seconds".
+    by, labels
+        As for `speed_accuracy`.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
+
+    Raises
+    ------
+    InputError
+        For another `x`.
+    """
     if x not in ("iterations", "seconds"):
         raise InputError("convergence histories are drawn against 'iterations' or 'seconds'.")
     figure, ax = make_figure()

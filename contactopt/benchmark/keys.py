@@ -50,7 +50,13 @@ KINDS = {
 
 
 def help_text() -> str:
-    """The keys as plain text."""
+    """Write every key of an experiment file as plain text, with an example each.
+
+    Returns
+    -------
+    str
+        The text, one line or two for each key.
+    """
     lines = ["keys of an experiment file, with an example each:"]
     lines += [f"  {key:16} {what}\n{'':19}{key} = {example}" for key, (what, example) in EXPERIMENT.items()]
     lines += ["", "keys of a table [[figures]]; from `by` on they belong to some kinds only:"]

@@ -41,7 +41,13 @@ NAMES = {
 
 
 def styles() -> list[dict[str, Any]]:
-    """Sixteen that differ in marker, and in colour or line; they come back after that."""
+    """Make the styles of lines.
+
+    Returns
+    -------
+    list
+        Sixteen that differ in marker, and in colour or line; they come back after that.
+    """
     made = [
         {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i], "ls": "-" if i < len(COLOURS) else "--"}
         for i in range(len(MARKERS))
@@ -50,9 +56,22 @@ def styles() -> list[dict[str, Any]]:
 
 
 def short_label(name: str, labels: Mapping[str, str] = MappingProxyType({})) -> str:
-    """The label that was given for a name; else the name itself, where it is long with the values of its settings only.
+    """Shorten the label of a line.
 
-    normal_qp(backend='clarabel', exact=True) becomes 'normal_qp clarabel exact'.
+    It is the label that was given for a name; else the name itself, where it is long with the values of its settings
+    only. normal_qp(backend='clarabel', exact=True) becomes 'normal_qp clarabel exact'.
+
+    Parameters
+    ----------
+    name
+        The name of a method with its settings.
+    labels
+        Labels that the experiment gives.
+
+    Returns
+    -------
+    str
+        The label.
     """
     if name in labels:
         return str(labels[name])
@@ -68,7 +87,15 @@ def short_label(name: str, labels: Mapping[str, str] = MappingProxyType({})) -> 
 
 
 def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """The names of lines in their colours beside their last points (x, y, name, colour), one above the other where they meet."""
+    """Write the names of lines in their colours beside their last points, one above the other where they meet.
+
+    Parameters
+    ----------
+    ax
+        The axes.
+    ends
+        (x, y, name, colour) of each line.
+    """
     ax.autoscale_view()
     taken: list[tuple[float, float]] = []  # places of labels in pixels
     for x, y, name, colour in sorted(ends, key=lambda end: end[1]):
@@ -81,7 +108,17 @@ def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
 
 
 def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any) -> None:
-    """The numbers of a map in its cells, black on light colours and white on dark ones."""
+    """Write the numbers of a map in its cells, black on light colours and white on dark ones.
+
+    Parameters
+    ----------
+    ax
+        The axes.
+    grid
+        The numbers, row by row.
+    norm
+        What takes a number to its place between the darkest and the lightest colour.
+    """
     values = grid.to_numpy(float)
     if values.size > CELLS:
         return
@@ -93,7 +130,20 @@ def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any) -> None:
 
 
 def make_figure(columns: int = 1, rows: int = 1, size: Sequence[float] = (7.6, 4.4)) -> tuple[Any, Any]:
-    """A figure and its axes, of that size each [inch]."""
+    """Make a figure with axes.
+
+    Parameters
+    ----------
+    columns, rows
+        Number of axes.
+    size
+        Width and height of one of them [inch].
+
+    Returns
+    -------
+    tuple
+        The figure, and its axes: one, or an array of them.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
@@ -101,7 +151,13 @@ def make_figure(columns: int = 1, rows: int = 1, size: Sequence[float] = (7.6, 4
 
 
 def set_ticks(axis: Any) -> None:
-    """At 1, 2, 5 on a logarithmic axis of less than two decades, where the usual labels run into each other."""
+    """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades, where the usual labels run into each other.
+
+    Parameters
+    ----------
+    axis
+        The axis.
+    """
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_view_interval()
@@ -112,7 +168,20 @@ def set_ticks(axis: Any) -> None:
 
 
 def add_legend(figure: Any, ax: Any, title: str | None = None) -> Any:
-    """The figure with a grid and a legend beside it."""
+    """Add a grid, and a legend beside the figure.
+
+    Parameters
+    ----------
+    figure, ax
+        The figure and its axes.
+    title
+        Of the legend.
+
+    Returns
+    -------
+    Figure
+        The figure.
+    """
     ax.grid(alpha=0.3)
     handles, labels = ax.get_legend_handles_labels()
     if handles:
@@ -123,6 +192,17 @@ def add_legend(figure: Any, ax: Any, title: str | None = None) -> Any:
 
 
 def short_tick(value: float) -> str:
-    """100000.0 -> 1e5"""
+    """Write a number as short as it can be: 100000.0 becomes 1e5.
+
+    Parameters
+    ----------
+    value
+        The number.
+
+    Returns
+    -------
+    str
+        The text.
+    """
     plain, power = f"{value:g}", f"{value:.1e}".replace(".0e", "e").replace("e+0", "e").replace("e-0", "e-")
     return power if len(power) < len(plain) and float(power) == value else plain

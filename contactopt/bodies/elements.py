@@ -72,13 +72,43 @@ class Trace(NamedTuple):
 
 
 def weight_at(weight: tuple[float, bool], x: np.ndarray) -> np.ndarray | float:
-    """Measure of the integrals: a constant (thickness, copies), times r in an axisymmetric scene."""
+    """Compute the measure of the integrals at places: a constant (thickness, copies), times r in an axisymmetric scene.
+
+    Parameters
+    ----------
+    weight
+        The constant, and whether the scene is axisymmetric.
+    x
+        (dim, ...) places [length].
+
+    Returns
+    -------
+    ndarray or float
+        The measure (...) in an axisymmetric scene, else one number.
+    """
     factor, axisymmetric = weight
     return factor * x[0] if axisymmetric else factor
 
 
 def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellBasis:
-    """Vector-valued displacement; quadrature exact for the stiffness of straight-sided parallelepipeds but for 1/r."""
+    """Make the vector-valued displacement basis of a mesh.
+
+    Its quadrature is exact for the stiffness of straight-sided parallelepipeds but for the factor 1/r.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+    degree
+        Degree of the displacement, 1 or 2.
+    axisymmetric
+        Whether the integrals carry the weight r.
+
+    Returns
+    -------
+    CellBasis
+        The basis of N unknowns.
+    """
     element = SHAPES[mesh.refdom.__name__][1][degree]()
     simplex = mesh.refdom.__name__ in ("RefTri", "RefTet") and not is_curved(mesh)
     order = 2 if simplex and not axisymmetric else 2 * degree + axisymmetric
@@ -136,12 +166,34 @@ class _Shapes(Sequence[Any]):
 
 
 def is_curved(mesh: skfem.Mesh) -> bool:
-    """Whether the mesh has nodes of its own on edges, which may lie off the straight line."""
+    """Say whether a mesh has nodes of its own on edges, which may lie off the straight line.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+
+    Returns
+    -------
+    bool
+        False for meshes whose nodes are their vertices.
+    """
     return int(mesh.p.shape[1]) != int(mesh.nvertices)
 
 
 def straight(mesh: skfem.Mesh) -> skfem.Mesh:
-    """The mesh of the same vertices with straight edges; boundaries keep their names."""
+    """Make the mesh of the same vertices with straight edges. Boundaries keep their names.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+
+    Returns
+    -------
+    Mesh
+        The mesh itself if it is straight.
+    """
     if not is_curved(mesh):
         return mesh
     plain = SHAPES[mesh.refdom.__name__][0](np.ascontiguousarray(mesh.p[:, : mesh.nvertices]), mesh.t)
@@ -149,13 +201,41 @@ def straight(mesh: skfem.Mesh) -> skfem.Mesh:
 
 
 def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
-    """(dim, N / dim) unknowns of every node, one row per component; the vertices of the mesh come first."""
+    """Number the unknowns of every node.
+
+    Parameters
+    ----------
+    basis
+        A displacement basis of N unknowns.
+
+    Returns
+    -------
+    ndarray
+        (dim, N / dim) unknowns, one row for each component. The vertices of the mesh come first.
+    """
     kinds = (basis.nodal_dofs, basis.edge_dofs, basis.facet_dofs, basis.interior_dofs)
     return np.concatenate([np.asarray(dofs) for dofs in kinds if np.size(dofs)], axis=1)
 
 
 def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: tuple[float, bool]) -> Trace:
-    """The trace of the displacement on a boundary (f,) of mesh facets."""
+    """Make the trace of the displacement on a boundary, with contact nodes, nodal areas and normals.
+
+    Parameters
+    ----------
+    basis
+        The displacement basis of the body.
+    degree
+        Its degree, 1 or 2.
+    boundary
+        (f,) numbers of the facets of the mesh.
+    weight
+        The measure of the integrals, as for `weight_at`.
+
+    Returns
+    -------
+    Trace
+        The contact nodes with areas [length^2], unit normals, and the sparse matrix W of this module's head.
+    """
     name = basis.mesh.refdom.__name__
     shape, places, cells = SHAPES[name][1][degree](), FACES[name][2], FACES[name][3]
     if degree == 1:
@@ -192,7 +272,22 @@ def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, wei
 
 
 def face_nodes(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (face, j) of the faces of a boundary, corners first in cyclic order, and mean outward normals (dim, face)."""
+    """Find the nodes and the normals of the faces of a boundary.
+
+    Parameters
+    ----------
+    basis
+        The displacement basis of the body.
+    degree
+        Its degree, 1 or 2.
+    boundary
+        (f,) numbers of the facets of the mesh.
+
+    Returns
+    -------
+    tuple
+        Nodes (f, j) of each face, corners first in cyclic order, and mean outward normals (dim, f).
+    """
     name = basis.mesh.refdom.__name__
     shape, places = SHAPES[name][1][degree](), FACES[name][2]
     if degree == 1:

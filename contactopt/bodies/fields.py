@@ -39,7 +39,13 @@ class Fields:
     contact: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def write_vtu(self, path: Path) -> None:
-        """The body as a VTU file with displacement, stress, von Mises stress and contact quantities at the nodes."""
+        """Write the body as a VTU file with displacement, stress, von Mises stress and contact quantities at the nodes.
+
+        Parameters
+        ----------
+        path
+            The file.
+        """
         from skfem.io.meshio import to_meshio
 
         flat = {f"stress_{name}": column for name, column in zip(self.names, self.stress.T)}
@@ -51,7 +57,20 @@ class Fields:
 
 
 def fields_of(body: Assembly, U: np.ndarray) -> Fields:
-    """Fields of a body at the displacement U (n,) of all its unknowns."""
+    """Compute the fields of a body at a displacement of all its unknowns.
+
+    Parameters
+    ----------
+    body
+        The assembled body of n unknowns.
+    U
+        (n,) displacement [length].
+
+    Returns
+    -------
+    Fields
+        Displacement, stress and von Mises stress at the vertices of the mesh.
+    """
     basis = body.basis
     stress = nodal_stress(body, U)
     full = np.stack([stress[i, j] for i, j in PLACES[len(body.unknowns)]], axis=1)
@@ -86,13 +105,26 @@ def nodal_stress(body: Assembly, U: np.ndarray) -> np.ndarray:
 
 
 def recovery_error(body: Assembly, U: np.ndarray, W: np.ndarray) -> np.ndarray:
-    """For every element the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)) [force length], (elements,).
+    """Estimate for every element how much it adds to the error of the energy, or of another functional.
 
-    s is the stress of a displacement and s* the continuous stress with its averages at the vertices, which is more
-    accurate where the solution is smooth. With W = U it is twice the energy of the estimated error in each element; with W
-    the displacement of an adjoint problem it is what the element adds to the error of that problem's functional.
+    For every element this is the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)). s is the stress of a displacement
+    and s* the continuous stress with its averages at the vertices, which is more accurate where the solution is smooth.
+    With W = U it is twice the energy of the estimated error in each element; with W the displacement of an adjoint
+    problem it is what the element adds to the error of that problem's functional.
 
     Source: Zienkiewicz, Zhu (1987), A simple error estimator and adaptive procedure for practical engineering analysis.
+
+    Parameters
+    ----------
+    body
+        The assembled body of n unknowns.
+    U, W
+        (n,) displacements [length].
+
+    Returns
+    -------
+    ndarray
+        (elements,) integrals [force length].
     """
     basis, mesh = body.basis, straight(body.basis.mesh)
     shape = SHAPES[mesh.refdom.__name__][1][1]()

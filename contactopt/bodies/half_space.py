@@ -297,7 +297,26 @@ def _periodic(body: HalfSpaceBody) -> Kernel:
 
 
 def assemble_half_space(scene: Scene, part: HalfSpace, elements: int, zone: float | None) -> HalfSpaceBody:
-    """A HalfSpace of a scene on its grid for `elements` and `zone`; the upper body fills the upper half."""
+    """Make a half-space of a scene on its grid. The upper body fills the upper half.
+
+    Parameters
+    ----------
+    scene, part
+        The scene and one of its half-spaces.
+    elements, zone
+        Number of points across the contact half-width, and the half-width that the grid resolves [length], for grids
+        that depend on them.
+
+    Returns
+    -------
+    HalfSpaceBody
+        The half-space on its grid.
+
+    Raises
+    ------
+    InputError
+        In an axisymmetric scene and in one with mirror images.
+    """
     if scene.kind == "axisymmetric" or scene.copies > 1:
         raise InputError(
             f"half-space '{part.name}': scene '{scene.name}' must be 'plane-strain' or 'solid' with copies = 1, because the "

@@ -28,7 +28,18 @@ CORNER = np.deg2rad(30)  # turn of a polygon between two edges from which on it 
 
 
 def simplices(mesh: Any) -> Any:
-    """The mesh as straight triangles or tetrahedra; quadrilaterals and hexahedra are cut, curved edges become straight."""
+    """Cut a mesh into straight triangles or tetrahedra.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh. Its quadrilaterals and hexahedra are cut, its curved edges become straight.
+
+    Returns
+    -------
+    Mesh
+        The mesh of simplices, with the names of the boundaries.
+    """
     if is_curved(mesh):
         mesh = replace(straight(mesh), _boundaries=mesh.boundaries)
     if isinstance(mesh, skfem.MeshQuad):
@@ -102,9 +113,23 @@ def _outside(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def boundary_curve(mesh: Any, name: str) -> Curve | None:
-    """The smooth line through the nodes of a plane boundary, by arc length; None in space and for straight boundaries.
+    """Lay a smooth line through the nodes of a plane boundary, by arc length.
 
-    Where the boundary turns by more than CORNER it has a corner, and the pieces between corners are smooth by themselves.
+    Where the boundary turns by more than CORNER it has a corner, and the pieces between corners are smooth by
+    themselves.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+    name
+        One of its boundaries.
+
+    Returns
+    -------
+    callable or None
+        A function that moves points (2, m) to their places on the line (2, m) [length]. None in space and for straight
+        boundaries.
     """
     if mesh.p.shape[0] != 2:
         return None

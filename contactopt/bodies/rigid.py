@@ -157,5 +157,18 @@ class RigidBody:
 
 
 def assemble_rigid(scene: Scene, part: Rigid, elements: int, zone: float | None) -> RigidBody:
-    """A Rigid part of a scene. `elements` and `zone` say nothing about it."""
+    """Make a rigid body of a scene.
+
+    Parameters
+    ----------
+    scene, part
+        The scene and one of its rigid parts.
+    elements, zone
+        Not used: a rigid body has no mesh.
+
+    Returns
+    -------
+    RigidBody
+        The body, whose unknowns are its motions.
+    """
     return RigidBody(part, scene.components)

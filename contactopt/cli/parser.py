@@ -24,7 +24,13 @@ EPILOG = """Examples:
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """Commands and options."""
+    """Build the parser of the command line, with all commands and options.
+
+    Returns
+    -------
+    ArgumentParser
+        The parser. What it reads has the function to execute in its attribute `command`.
+    """
     parser = argparse.ArgumentParser(
         "contactopt",
         description="Frictional contact as mathematical programs.",

@@ -54,7 +54,25 @@ class Functional:
 
 
 def seeds_of(quantity: Any, step: Step) -> Seeds:
-    """The value and the derivatives of a quantity, by its name or as a function of the state; InputError for an unknown one."""
+    """Differentiate a quantity of a solved state.
+
+    Parameters
+    ----------
+    quantity
+        A name from this module's head, or a function of the state that returns Seeds.
+    step
+        The solved state.
+
+    Returns
+    -------
+    Seeds
+        The value of the quantity, and its derivatives by forces, multipliers and displacements.
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity.
+    """
     if callable(quantity):
         return quantity(step)
     if not isinstance(quantity, str):

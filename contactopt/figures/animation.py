@@ -43,7 +43,18 @@ def energies(path: PathResult, ax: Any = None) -> Any:
 
 
 def path_figure(path: PathResult) -> Any:
-    """Loop and energies side by side; a Figure."""
+    """Draw the loop of force and displacement and the energies of a load path side by side.
+
+    Parameters
+    ----------
+    path
+        The solved load path.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10.8, 4.2), layout="constrained")

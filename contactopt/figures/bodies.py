@@ -16,7 +16,22 @@ ELEVATION, AZIMUTH = 22.0, -130.0  # degrees, from where solids are seen
 
 
 def magnification(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields]) -> float:
-    """Factor by which displacements are drawn: a round number, 1 where bodies are apart at first."""
+    """Choose the factor by which displacements are drawn: a round number, 1 where bodies are apart at first.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    problem
+        Its interface problem.
+    fields
+        The displacements of its bodies.
+
+    Returns
+    -------
+    float
+        The factor, at least 1.
+    """
     displacement = max(float(np.abs(f.displacement).max()) for f in fields)
     if displacement == 0 or np.ptp(problem.q[:, 0]) > 1e-3 * displacement:
         return 1.0
@@ -29,7 +44,24 @@ def magnification(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fiel
 
 
 def deformed(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], ax: Any = None) -> Any:
-    """Deformed bodies coloured by von Mises stress, mirrored to the whole section (paper, figures 1 and 2)."""
+    """Draw the deformed bodies coloured by von Mises stress, mirrored to the whole section (paper, figures 1 and 2).
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    problem
+        Its interface problem.
+    fields
+        Displacements and stresses of its bodies.
+    ax
+        Axes to draw on; by default new ones.
+
+    Returns
+    -------
+    Axes
+        The axes.
+    """
     scale = magnification(scene, problem, fields)
     top = float(np.quantile(np.concatenate([f.von_mises for f in fields]), 0.998)) or 1.0
     if scene.dim == 3:
@@ -42,10 +74,22 @@ def deformed(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], 
 
 
 def mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] | None:
-    """Coordinate axis of a plane section and place on it beyond which the bodies are mirrored; None: they are whole.
+    """Find beyond which place of a plane section the bodies are mirrored.
 
     It is the axis of revolution, or the plane of symmetry of a half model: that cuts the contact line at the origin of
     its chart, across the line.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    problem
+        Its interface problem.
+
+    Returns
+    -------
+    tuple or None
+        The number of a coordinate axis and the place on it [length]; None where the bodies are whole.
     """
     if scene.kind == "axisymmetric":
         return 0, 0.0

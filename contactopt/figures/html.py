@@ -32,7 +32,18 @@ def check_installed() -> None:
 
 
 def packed(array: Any) -> dict[str, Any]:
-    """An array for the data of a page: numbers of four bytes each."""
+    """Pack an array for the data of a page, as numbers of four bytes each.
+
+    Parameters
+    ----------
+    array
+        Numbers or truth values of any shape.
+
+    Returns
+    -------
+    dict
+        Its type, its shape, and its bytes as text.
+    """
     array = np.asarray(array)
     name, kind = KINDS[array.dtype.kind]
     data = np.ascontiguousarray(array.astype(kind))
@@ -40,19 +51,30 @@ def packed(array: Any) -> dict[str, Any]:
 
 
 def write_html(file: str | Path, title: str, body: str, data: Mapping[str, Any], programs: Sequence[str]) -> Path:
-    """Write a page; returns its path.
+    """Write a page that stands alone.
 
     Parameters
     ----------
-    file : where to write it
-    title : of the page, plain text
-    body : HTML between header and programs, with every name in it escaped
-    data : what the programs read; anything that JSON can hold
-    programs : names of JavaScript files in contactopt/figures/pages, run in this order once plotly is there
+    file
+        Where to write it.
+    title
+        Of the page, plain text.
+    body
+        HTML between header and programs, with every name in it escaped.
+    data
+        What the programs read; anything that JSON can hold.
+    programs
+        Names of JavaScript files in contactopt/figures/pages, run in this order once plotly is there.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
-    InputError : if plotly is not installed, or the file cannot be written
+    InputError
+        If plotly is not installed, or the file cannot be written.
     """
     check_installed()
     from plotly.offline import get_plotlyjs

@@ -12,7 +12,20 @@ from contactopt.problem import Solution
 
 
 def maps_figure(reduction: Reduction, solution: Solution) -> Any:
-    """Pressure, gap, and where there is friction size of traction, size of slip and stick; a Figure."""
+    """Draw maps of pressure and gap, and where there is friction of traction, slip and stick.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of a scene with a half-space.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
+    """
     from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
 

@@ -29,11 +29,33 @@ RUN_FILES = (
 
 
 def squeeze(t: np.ndarray) -> np.ndarray:
+    """Drop the second axis of an array (k, d) where d is one, as in 2D.
+
+    Parameters
+    ----------
+    t
+        (k, d) tangential components.
+
+    Returns
+    -------
+    ndarray
+        (k,) or (k, d).
+    """
     return t[:, 0] if t.shape[1] == 1 else t
 
 
 def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
-    """The figures of a result in each of the formats: bodies, pressure and traction of every pair, maps, load path."""
+    """Draw the figures of a result: bodies, pressure and traction of every pair, maps, load path.
+
+    Parameters
+    ----------
+    result
+        The solved scene.
+    folder
+        Where the files go.
+    formats
+        Endings of the files, each figure in every one of them.
+    """
     from contactopt.figures import plots
 
     def save(figure: Any, name: str) -> None:
@@ -58,7 +80,15 @@ def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
 
 
 def write(result: Result, folder: Path) -> None:
-    """The fields of a result as VTU files, its contact forces and its load path as arrays."""
+    """Write the fields of a result as VTU files, its contact forces and its load path as arrays.
+
+    Parameters
+    ----------
+    result
+        The solved scene.
+    folder
+        Where the files go.
+    """
     surfaces = contact_fields(result.reduction, result.solution)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
         fields.write_vtu(folder / f"{fields.name}.vtu")
@@ -86,10 +116,21 @@ def write(result: Result, folder: Path) -> None:
 
 
 def earlier_files(folder: Path) -> set[str]:
-    """Names of the files that an earlier `contactopt run` wrote into the folder; empty where none has run.
+    """List the files that an earlier `contactopt run` wrote into a folder.
 
-    A folder in which one has run holds its summary.json. Its other files have fixed names, but for a VTU file per body and
-    per pair of surfaces, told from other people's by the fields in them, and pictures of the pairs that the summary names.
+    A folder in which one has run holds its summary.json. Its other files have fixed names, but for a VTU file per body
+    and per pair of surfaces, told from other people's by the fields in them, and pictures of the pairs that the summary
+    names.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+
+    Returns
+    -------
+    set
+        Names of files; empty where none has run.
     """
     with suppress(OSError, ValueError, TypeError):
         summary = json.loads(_plain_text(folder / "summary.json"))

@@ -30,9 +30,20 @@ CENTRED = 0.1  # a contact zone whose centre is off the origin by less than this
 
 
 def contact_line(problem: InterfaceProblem) -> np.ndarray:
-    """Contacts along the first direction of the surface, in order; in 3D those of the row nearest to its origin.
+    """Choose the contacts along the first direction of the surface, in order; in 3D those of the row nearest to its
+    origin.
 
     A closed line is cut opposite to its origin, so that its places grow from -period / 2 to period / 2.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of one pair of surfaces.
+
+    Returns
+    -------
+    ndarray
+        (j,) numbers of contacts.
     """
     x = problem.chart.places
     row = np.ones(x.shape[1], dtype=bool)
@@ -44,7 +55,18 @@ def contact_line(problem: InterfaceProblem) -> np.ndarray:
 
 
 def contact_place(problem: InterfaceProblem) -> np.ndarray:
-    """Places (k,) along the first direction of the surface, of a closed line from its origin either way [length]."""
+    """Compute places along the first direction of the surface; of a closed line from its origin either way.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of one pair of surfaces.
+
+    Returns
+    -------
+    ndarray
+        (k,) places [length].
+    """
     x, period = problem.chart.places[0], problem.chart.period
     return x if period is None else np.asarray((x + period / 2) % period - period / 2)
 
@@ -191,7 +213,20 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
 
 
 def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) -> Any:
-    """Pressure and tangential traction side by side, with the map of stick and slip in 3D; a Figure."""
+    """Draw pressure and tangential traction side by side, with the map of stick and slip in 3D.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    problem, solution
+        The interface problem of one pair of surfaces, and its solution.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
+    """
     from matplotlib.figure import Figure
 
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
@@ -217,7 +252,20 @@ def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
 
 
 def fit(found: Fit, ax: Any = None) -> Any:
-    """What the model leaves of the data, over the standard deviation of the noise, state by state."""
+    """Draw what the model leaves of the data, over the standard deviation of the noise, state by state.
+
+    Parameters
+    ----------
+    found
+        The parameters that were fitted.
+    ax
+        Axes to draw on; by default new ones.
+
+    Returns
+    -------
+    Axes
+        The axes.
+    """
     ax = make_axes(ax)
     for (name, measured), colour in zip(found.data.items(), (BLUE, ORANGE, GREEN, GREY)):
         rest = (measured - found.model[name]) / (found.noise[name] or 1.0)
@@ -231,7 +279,20 @@ def fit(found: Fit, ax: Any = None) -> Any:
 
 
 def design(found: Design, ax: Any = None) -> Any:
-    """The pressure of the designed contact over the place along the surface, and its mean."""
+    """Draw the pressure of the designed contact over the place along the surface, and its mean.
+
+    Parameters
+    ----------
+    found
+        The design.
+    ax
+        Axes to draw on; by default new ones.
+
+    Returns
+    -------
+    Axes
+        The axes.
+    """
     ax = make_axes(ax)
     problem = found.reduction.problem
     place = problem.chart.places[0]

@@ -59,7 +59,18 @@ tol = 1e-8
 
 
 def write_example(path: Path) -> None:
-    """Write the example; InputError where a file is there already, or none can be written."""
+    """Write an example of a scene file, with a comment on every entry.
+
+    Parameters
+    ----------
+    path
+        The file, whose name ends in .toml.
+
+    Raises
+    ------
+    InputError
+        If the name has another ending, if the file is there already, or if it cannot be written.
+    """
     if path.suffix != ".toml":
         raise InputError(f"a scene file's name ends in .toml; got '{path}'.")
     try:

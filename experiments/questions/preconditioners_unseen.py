@@ -17,7 +17,7 @@ RUBBER = Material(5.0, 0.3)
 EVEN = np.linspace(-2.0, 2.0, 65)
 ROOM = "contactopt.solving.preconditioners"
 # The same numbers as a half-space and slowly varying meshes have them, without any fit.
-UNFITTED = {f"{ROOM}.neumann": {"SOFT": 0.0}, f"{ROOM}.grid": {"CELL": 0.5, "EDGE": 0.0}}
+UNFITTED = {f"{ROOM}.neumann": {"DISPERSION": 0.0}, f"{ROOM}.grid": {"CELL": 0.5, "EDGE": 0.0}}
 CHOICES = ("none", "p21", "neumann, no constant fitted", "neumann")
 
 
@@ -170,7 +170,7 @@ TEXT = """The constants of `neumann` (`contactopt/solving/preconditioners/consta
 
 {space}
 
-"neumann, no constant fitted" has SOFT = 0, CELL = 1/2 and EDGE = 0.
+"neumann, no constant fitted" has DISPERSION = 0, CELL = 1/2 and EDGE = 0.
 """
 
 

@@ -80,7 +80,18 @@ PRECONDITIONERS = {
 
 
 def find_preconditioner(name: str | None) -> None:
-    """InputError unless there is a preconditioner of that name; None and 'none' are choices of the methods."""
+    """Check that there is a preconditioner of a name. None and 'none' are choices of the methods.
+
+    Parameters
+    ----------
+    name
+        The name that the user gave.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
     if name not in (None, "none", *PRECONDITIONERS):
         raise InputError(f"unknown preconditioner {name!r}; choose from {', '.join(PRECONDITIONERS)}.")
 
@@ -139,7 +150,18 @@ def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Precondit
 
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
-    """Constant and linear motions of every pair of surfaces, (k dim, j)."""
+    """Write the constant and linear motions of every pair of surfaces as columns.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of k contacts.
+
+    Returns
+    -------
+    ndarray
+        (k dim, j) motions.
+    """
     parts = [_smooth_motions(part_of(problem, pair)) for pair in problem.pairs]
     return np.asarray(la.block_diag(*parts))
 
@@ -163,11 +185,28 @@ def _smooth_motions(problem: InterfaceProblem) -> np.ndarray:
 
 
 def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
-    """P made exact on the columns of Z (n, j): c (I - Z A^-1 Z'Q) P (I - Q Z A^-1 Z') + Z A^-1 Z' with A = Z'QZ.
+    """Make a preconditioner exact on some columns: c (I - Z A^-1 Z'Q) P (I - Q Z A^-1 Z') + Z A^-1 Z' with A = Z'QZ.
 
-    The factor c puts the eigenvalues of P Q about 1, where those of the exact part are. Needs j + 1 products with Q once;
-    each application adds O(n j). Its inverse is the block secant update of P^-1 = G (Schnabel 1983),
-    G/c - G/c Z (Z'G/c Z)^-1 Z'G/c + QZ A^-1 (QZ)'.
+    The factor c puts the eigenvalues of P Q about 1, where those of the exact part are. It needs j + 1 products with Q
+    once; each application adds O(n j). Its inverse is the block secant update of P^-1 = G, G/c - G/c Z (Z'G/c Z)^-1
+    Z'G/c + QZ A^-1 (QZ)'.
+
+    Sources: Mandel (1993), Balancing domain decomposition; Schnabel (1983), Quasi-Newton methods using multiple secant
+    equations.
+
+    Parameters
+    ----------
+    P
+        The preconditioner, with its model G of Q if it has one.
+    Q
+        (n, n) interface operator.
+    Z
+        (n, j) the columns.
+
+    Returns
+    -------
+    Preconditioner
+        The preconditioner, with the model that belongs to it.
     """
     QZ = np.asarray(Q @ Z)
     A = Z.T @ QZ
@@ -191,10 +230,24 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
 
 
 def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> LinearOperator:
-    """An approximate inverse of U'QU + diag(added), for U (n, m) with orthonormal columns and added (m,) >= 0.
+    """Make an approximate inverse of U'QU + diag(added).
 
-    U selects the unknowns of an active set, or directions in which contacts may still move. With a model G of Q,
-    (U'GU + diag(added))^-1 by an inner PCG; without, U'PU (paper, section 5.2).
+    U selects the unknowns of an active set, or directions in which contacts may still move. With a model G of Q it is
+    (U'GU + diag(added))^-1 by an inner PCG; without one it is U'PU (paper, section 5.2).
+
+    Parameters
+    ----------
+    P
+        The preconditioner, with its model G of Q if it has one.
+    U
+        (n, m) sparse matrix with orthonormal columns.
+    added
+        (m,) at least zero.
+
+    Returns
+    -------
+    LinearOperator
+        (m, m).
     """
     m = U.shape[1]
     rows = LinearOperator((m, m), matvec=lambda x: U.T @ (P @ (U @ x.ravel())), dtype=float)
@@ -206,6 +259,19 @@ def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> Linear
 
 
 def selection(n: int, unknowns: np.ndarray) -> sp.csr_matrix:
-    """U (n, m) whose columns are the unit vectors of these unknowns (m,)."""
+    """Write the matrix whose columns are the unit vectors of some unknowns.
+
+    Parameters
+    ----------
+    n
+        Number of all unknowns.
+    unknowns
+        (m,) the chosen ones.
+
+    Returns
+    -------
+    csr_matrix
+        U (n, m).
+    """
     m = len(unknowns)
     return sp.csr_matrix((np.ones(m), (unknowns, np.arange(m))), (n, m))
