@@ -36,7 +36,7 @@ Q = np.linalg.inv(K)
 load = np.array([-3.0, 1.0])  # N: 3 N down, 1 N to the right
 q = np.array([1.0, 0.0]) + Q @ load  # the gap without load is 1 mm
 mu = 0.5  # friction coefficient
-print("K =", K.tolist(), " Q =", np.round(Q, 6).tolist(), " q =", q)
+print("K =", np.round(K, 6).tolist(), " Q =", np.round(Q, 6).tolist(), " q =", np.round(q, 6).tolist())
 
 assert np.allclose(Q, [[1, -1], [-1, 2]]) and np.allclose(q, [-3, 5])
 

@@ -70,7 +70,7 @@ Q = np.linalg.inv(A)
 q = d - Q @ weight
 
 # %% [markdown]
-# ## Primal, dual, and what joins them
+# ## Primal and dual
 #
 # The string takes the shape of least energy among all shapes above the floor (primal). The forces are the minimum of another
 # function (dual). In these programs $u$, $r$, $w$ and $q$ are vectors with one number for each inner node.
@@ -80,6 +80,8 @@ q = d - Q @ weight
 # | unknowns | gaps $u$ | forces $r$ |
 # | program | $\min_{u \ge 0} \tfrac12 (u - d)' A (u - d) + w' u$ | $\min_{r \ge 0} \tfrac12 r' Q r + q' r$ |
 # | multiplier of the constraint | $r = A (u - d) + w$ | $u = Q r + q$ |
+#
+# ## The optimality conditions
 #
 # Both programs have the same optimality conditions (KKT conditions). They are equilibrium, and Signorini's conditions at
 # every node:
@@ -119,14 +121,15 @@ def exact(height, places):
 
 
 truth, a = exact(d, x)
-fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 left.plot(x, u.value, "C0.", label="computed")
 left.plot(x, truth, "k-", lw=1, label="exact")
 left.set(xlabel="x [mm]", ylabel="gap [mm]")
 left.legend(frameon=False)
 right.plot(x, r.value * 40 / L, "C1.")
-right.axhline(f, color="k", lw=1)
-right.set(xlabel="x [mm]", ylabel="force of the floor per length [N/mm]")
+right.axhline(f, color="k", lw=1, label="weight $f$")
+right.set(xlabel="x [mm]", ylabel="floor's force per length [N/mm]")
+right.legend(frameon=False, loc="center")
 
 assert np.isclose(a, 0.25) and np.abs(u.value - truth).max() < 1e-3
 
@@ -233,7 +236,7 @@ def proximal_galerkin(steps, alpha=0.1):
 stiffness = 10.0 ** np.arange(2, 7)
 depths = [-penalty(kappa).min() for kappa in stiffness]
 gap, errors = proximal_galerkin(25)
-fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 left.loglog(stiffness, depths, "o-")
 left.set(xlabel=r"penalty stiffness $\kappa$ [N/mm$^2$]", ylabel="largest depth [mm]", title="penalty")
 right.semilogy(range(1, 26), errors, "s-", color="C1", label="against the exact string")
@@ -244,8 +247,7 @@ assert gap.min() > 0 and errors[-1] < 5e-3
 
 # %% [markdown]
 # The string of the penalty method sinks into the floor by $f / \kappa$, as deep as a bed of springs gives way under its weight.
-# The string of the proximal method never touches the floor, and comes closer in every step. In the end the error on the
-# right does not fall any more: it is then the error of the mesh.
+# The string of the proximal method never touches the floor, and comes closer in every step.
 #
 # ## What fails
 #

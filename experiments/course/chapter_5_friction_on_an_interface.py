@@ -44,14 +44,14 @@ ax.fill([0, 45, 45, 0], [0, 0, -25, -25], color="C1", alpha=0.25, lw=0)
 ax.plot([0, 0], [-25, 44], "k-.", lw=0.8)
 ax.plot([0, 20], [40.6, 40.6], "k", lw=4)
 ax.annotate("", (10, 42), (10, 54), arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2})
-ax.text(11.5, 47, "100 N on the whole plate", color="C3")
+ax.text(11.5, 47, "100 N", color="C3")
 for head, name in (((40, 6), "$t$"), ((28, 18), "$n$")):
     ax.annotate("", head, (28, 6), arrowprops={"arrowstyle": "-|>", "color": "k"})
     ax.text(head[0] + 1, head[1] + 1, name)
 ax.plot(problem.coordinates[0], problem.coordinates[1], "k.", ms=3)
 ax.text(3, 20, "block")
 ax.text(3, -14, "foundation")
-ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 52), ylim=(-26, 57))
+ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48), ylim=(-26, 57))
 
 # %% [markdown]
 # ## Primal and dual for a given bound

@@ -155,7 +155,7 @@ dots = ax.scatter(x, y, c=pressure / problem.areas, s=110, marker="s", alpha=0.6
 ax.quiver(x, y, *answer.reactions[:, 1:].T, color="black", width=0.005, zorder=3)
 ax.plot(x[slips], y[slips], "rx", ms=5, label="slips", zorder=4)
 ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-ax.legend(loc="upper right")
+ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
 fig.colorbar(dots, label="pressure [MPa]")
 print(f"{problem.contacts} contacts, {int(slips.sum())} slip, certificate {answer.residual:.0e}")
 

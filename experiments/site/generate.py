@@ -29,6 +29,7 @@ TUTORIALS = (
     "beat_our_solvers",
     "reading_a_strangers_problem",
     "derivatives_with_kinks",
+    "half_space_or_finite_elements",
 )
 # reports about accuracy; all others are about performance
 ACCURACY = (
@@ -100,7 +101,11 @@ def notebook(folder: str, name: str, text: str, head: str = "") -> Iterator[tupl
     offer = f"#\n# {{download}}`Download this page as a notebook <../notebooks/{name}.ipynb>`"
     yield Path(folder, f"{name}.py"), f"{head}# %% [markdown]\n{title}\n{offer}\n{rest}"
     local = re.sub(r"\]\((\w+)\.py\)", r"](\1.ipynb)", text)  # notebooks of one folder refer to each other
-    yield Path("notebooks", f"{name}.ipynb"), jupytext.writes(jupytext.reads(local, "py:percent"), "ipynb")
+    book = jupytext.reads(local, "py:percent")
+    for cell in book.cells:  # what the page folds, JupyterLab folds too
+        if "hide-input" in cell.metadata.get("tags", []):
+            cell.metadata["jupyter"] = {"source_hidden": True}
+    yield Path("notebooks", f"{name}.ipynb"), jupytext.writes(book, "ipynb")
 
 
 def course(site: Path) -> Iterator[tuple[Path, str]]:

@@ -2,9 +2,9 @@
 # # 4. Four roads to one answer
 #
 # A solution of Coulomb's problem is not the minimum of an energy. So every method replaces this problem, again and again,
-# by another one that can be solved. In this tutorial four methods solve the same problem: the alternating iteration,
+# by another one that can be solved. In this tutorial we give the same problem to four methods: the alternating iteration,
 # Tresca's iteration, Newton's method and the convex relaxation. The first three arrive at the same answer on different
-# roads. The fourth arrives in one step, but at another place.
+# roads. The fourth needs one step only, but arrives at the answer to another problem.
 #
 # Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) has the programs for one node.
 
@@ -119,7 +119,7 @@ u = problem.displacements(r, answers["newton"].multipliers)
 u_relaxed = problem.displacements(relaxed.reactions, relaxed.multipliers)
 
 x = problem.coordinates[0]
-fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
+fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 for label, forces, style in (("Coulomb", r, "C0-"), ("associated", relaxed.reactions, "C1--")):
     left.plot(x, -forces[:, 1] / problem.areas, style, label=label)
 left.set(xlabel="x [mm]", ylabel="friction on the block, inwards [MPa]")
@@ -147,9 +147,10 @@ assert diagnose(problem).relaxation == "not tight"
 assert natural_map_residual(problem, r, answers["newton"].multipliers) < 1e-12
 
 # %% [markdown]
-# Which road should you take? Newton's method needs few steps, with one dense factorisation in each, and it may run in a
-# circle if $Q$ is singular. The fixed-point iterations use a good QP solver as it stands. The default, `solve(problem)`,
-# begins with Newton's method. Where that fails, it solves cone programs, and then runs a proximal loop.
+# Which road should you take? Newton's method needs few steps. Each step takes one factorisation of a dense matrix. It may run
+# in a circle if $Q$ is singular. The fixed-point iterations need nothing but a good QP solver. The default,
+# `solve(problem)`, begins with Newton's method. If that fails, it tries an interior-point method, then cone programs, and at
+# last the method `proximal`.
 #
 # ## Exercises
 #
