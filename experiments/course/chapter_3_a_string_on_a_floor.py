@@ -129,7 +129,7 @@ left.legend(frameon=False)
 right.plot(x, r.value * 40 / L, "C1.")
 right.axhline(f, color="k", lw=1, label="weight $f$")
 right.set(xlabel="x [mm]", ylabel="floor's force per length [N/mm]")
-right.legend(frameon=False, loc="center")
+right.legend(frameon=False, loc="lower center")
 
 assert np.isclose(a, 0.25) and np.abs(u.value - truth).max() < 1e-3
 

@@ -151,7 +151,7 @@ fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained"
 left.plot(shift, T, "o-", ms=3)
 left.set(xlabel="shift of the plate [mm]", ylabel="shear force T [N]")
 right.plot(1e3 * (shift - stiffness_line), T, "o-", ms=3)
-right.set(xlabel="shift beyond the line through the tips [µm]", ylabel="shear force T [N]")
+right.set(xlabel="shift beyond the line [µm]", ylabel="shear force T [N]")
 
 assert np.allclose(shift[turned], shift[-1], rtol=1e-6)  # the loop closes
 assert abs(shift[home]) > 0.002  # but it does not go through zero

@@ -138,15 +138,15 @@ values, vectors = np.linalg.eigh(Q_nn)
 values, vectors = values[::-1], vectors[:, ::-1]  # softest first
 x = problem.coordinates[0]
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
+fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.8), layout="constrained")
 for column in (0, 16, 24):
     left.plot(x, Q_nn[:, column], label=f"force at x = {x[column]:g} mm")
 left.set(xlabel="x [mm]", ylabel="normal displacement [mm/N]")
-left.legend(frameon=False)
+left.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 for j in (0, 1, 2, 5):
-    right.plot(x, vectors[:, j] * np.sign(vectors[-1, j]), label=f"eigenvector {j}")
-right.set(xlabel="x [mm]", ylabel="eigenvector, unit length [-]", ylim=(-0.4, 0.52))
-right.legend(frameon=False, ncols=2)
+    right.plot(x, vectors[:, j] * np.sign(vectors[-1, j]), label=f"number {j}")
+right.set(xlabel="x [mm]", ylabel="eigenvector, unit length [-]")
+right.legend(frameon=False, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 assert np.array_equal(np.argmax(Q_nn, axis=0), np.arange(nodes))
 assert Q_nn[0, 0] > 1.8 * Q_nn[16, 16]
