@@ -86,8 +86,9 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
                 yield Path("reports", base(path), picture[1]), path.parent / picture[1]
 
 
-TUTORIAL_TEXT = """Each tutorial is a script, a notebook to download, and a page of this site. It takes about ten minutes to read.
-Every claim is asserted in its code, and the exercises have hidden solutions. [The course](course.md) says how to open a notebook.
+TUTORIAL_TEXT = """Each tutorial has one subject. It is a script, a notebook to download, and a page of this site. It takes ten to fifteen minutes
+to read. The code checks every claim by an assertion. The exercises have hidden solutions: click on *Solution* to open one.
+[The course](course.md) says how to open a notebook.
 """
 
 
