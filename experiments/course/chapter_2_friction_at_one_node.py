@@ -83,8 +83,8 @@ ax.axis("off")
 #
 # ## The optimality conditions
 #
-# Both problems have the same optimality conditions (KKT conditions, chapter 1). They are equilibrium of the springs,
-# Signorini's conditions, and a law of friction:
+# Both problems have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They are equilibrium
+# of the springs, Signorini's conditions, and a law of friction:
 #
 # $$ u = Q\, r + q, \qquad\quad u_n \ge 0, \quad r_n \ge 0, \quad u_n r_n = 0, $$
 #

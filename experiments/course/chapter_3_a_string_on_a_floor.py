@@ -73,7 +73,8 @@ q = d - Q @ weight
 # ## Primal and dual
 #
 # The string takes the shape of least energy among all shapes above the floor (primal). The forces are the minimum of another
-# function (dual). In these programs $u$, $r$, $w$ and $q$ are vectors with one number for each inner node.
+# function (dual). In these programs $u$, $r$, $w$ and $q$ are vectors with one number for each inner node. The difference
+# $u - d$ says how high the nodes are relative to the ends; it is negative where the string sags.
 #
 # | | primal | dual |
 # |---|---|---|
@@ -83,8 +84,8 @@ q = d - Q @ weight
 #
 # ## The optimality conditions
 #
-# Both programs have the same optimality conditions (KKT conditions). They are equilibrium, and Signorini's conditions at
-# every node:
+# Both programs have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They are equilibrium,
+# and Signorini's conditions at every node:
 #
 # $$ u = Q\, r + q, \qquad u_i \ge 0, \qquad r_i \ge 0, \qquad u_i\, r_i = 0 . $$
 #

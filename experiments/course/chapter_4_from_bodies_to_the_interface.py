@@ -132,8 +132,8 @@ assert np.allclose(S, schur)
 #
 # ## The optimality conditions
 #
-# Primal and dual have the same optimality conditions (KKT conditions). They are equilibrium of the block, and Signorini's
-# conditions at every node $i$ of the contact:
+# Primal and dual have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They are equilibrium
+# of the block, and Signorini's conditions at every node $i$ of the contact:
 #
 # $$ u_n = Q_{nn} r_n + q_n, \qquad u_{n,i} \ge 0, \qquad r_{n,i} \ge 0, \qquad u_{n,i}\, r_{n,i} = 0 . $$
 #

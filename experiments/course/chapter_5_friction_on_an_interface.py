@@ -68,8 +68,8 @@ ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48), ylim=(-2
 #
 # ## The optimality conditions
 #
-# Both have the same optimality conditions (KKT conditions): equilibrium of the bodies and of the plate, Signorini's
-# conditions, and friction with the bound $g$, at every node $i$.
+# Both have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They are equilibrium of the
+# bodies and of the plate, and, at every node $i$, Signorini's conditions and friction with the bound $g_i$:
 #
 # $$ u = Q\, r + V \lambda + q, \qquad V' r + s = 0, \qquad u_{n,i} \ge 0, \quad r_{n,i} \ge 0, \quad u_{n,i}\, r_{n,i} = 0, $$
 #

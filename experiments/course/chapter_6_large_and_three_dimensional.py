@@ -58,8 +58,8 @@ ax.view_init(elev=22, azim=-58)
 #
 # ## The optimality conditions
 #
-# The optimality conditions (KKT conditions) of both are those of chapter 5, for vectors in the surface. Friction points
-# against the slip:
+# The optimality conditions of Karush, Kuhn and Tucker (KKT conditions) are those of chapter 5, but the tangential parts are
+# vectors in the surface. Friction points against the slip:
 #
 # $$ u = Q\, r + V \lambda + q, \qquad V' r + s = 0, \qquad u_{n,i} \ge 0, \quad r_{n,i} \ge 0, \quad u_{n,i}\, r_{n,i} = 0, $$
 #

@@ -46,7 +46,7 @@ for method in ("alternating", "tresca"):
 #
 # | method | what it holds fixed | what it solves in each iteration |
 # |---|---|---|
-# | alternating | the friction forces, then the normal forces | two QPs (section 5.1 of the paper) |
+# | alternating | the friction forces, then the normal forces | two quadratic programs (QPs), one for the normal and one for the friction forces |
 # | Tresca | the friction bounds $g = \mu r_n$ | one QP in all forces |
 # | Newton | which nodes are open, stick or slip | one linear system |
 #

@@ -166,7 +166,7 @@ assert np.allclose(only.reactions, [[6.4, 6.4]])
 assert stuck_in_a_loop.status is Status.CYCLING
 
 # %% [markdown]
-# A drawing shows why. For a given friction bound $g$ one QP yields the normal force $r_n(g)$, and the next bound is
+# A drawing shows why. For a given friction bound $g$ one quadratic program yields the normal force $r_n(g)$, and the next bound is
 # $\mu\, r_n(g)$. A solution is a point where this curve meets the diagonal. The iteration goes vertically to the curve, then
 # horizontally to the diagonal, and so on. If the curve falls by more than one per unit, the path spirals outwards.
 
