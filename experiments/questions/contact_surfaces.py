@@ -209,8 +209,8 @@ the whole operator, with normal and tangential components together. It also has 
 right-hand side to 1e-8. `deflated` means that constant and linear motions are solved for exactly. The only number that was fitted to
 stubs is ALONG (`contactopt/solving/preconditioners/constants.py`), and it was fitted on the disc.
 
-1. With deflation, the worst surface that was not fitted on is {worst}: condition {most:.1f}; the most iterations are {steps}.
-   On the disc they are {disc}. {beyond}
+1. With deflation, the worst surface that was not fitted on is {worst}, with the condition number {most:.1f}. No surface takes more than {steps} iterations. On the disc
+   the condition numbers are {disc}. {beyond}
 2. By itself the preconditioner has condition numbers up to {plain:.1f}, and needs at most {plainsteps} iterations. Without any
    preconditioner, conjugate gradients take up to {none}.
 3. The ratio of the stiffnesses of the two bodies, from 1e-4 to 1e4, changes a condition number by at most {spread:.0f} %.
@@ -242,7 +242,7 @@ def report(rows: list[dict]) -> str:
         most=worst["deflated: condition"],
         steps=max(row["deflated: iterations"] for row in rows),
         disc=f"{min(disc):.1f} to {max(disc):.1f}",
-        beyond=f"Above 10 or 30 iterations: {len(above)} of {len(rows)} rows.",
+        beyond=f"{len(above)} of {len(rows)} rows have a condition number above 10 or more than 30 iterations.",
         plain=max(row["laplacian: condition"] for row in rows),
         plainsteps=max(row["laplacian: iterations"] for row in rows),
         none=max(row["none: iterations"] for row in rows),

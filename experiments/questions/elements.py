@@ -241,19 +241,19 @@ def findings(rows: list[dict], ripple: list[dict]) -> str:
     table = cheapest(rows)
     said = []
     for target in (f"{100 * t:g} %" for t in TARGETS):
-        for what, word in (("fewest unknowns", "the fewest unknowns"), ("least time", "the least time")):
+        for what, word in (("fewest unknowns", "fewest unknowns are needed"), ("least time", "least time is needed")):
             won = [
                 f"{r['case']}, {r['quantity']}: {r[what]}" for r in table if r["error"] == target and r[what] != "none"
             ]
-            said.append(f"- At {target}, {word}: {'; '.join(won)}.")
+            said.append(f"- For an error of {target} the {word} by these elements: {'; '.join(won)}.")
     for case in ("sphere", "sphere 3D"):
         own = {r["element"]: float(r["ripple"]) for r in ripple if r["case"] == case}
         other = own.pop("P2, contacts at all nodes")
         worst = max(own, key=lambda k: own[k])
         said.append(
             f"- {case}: on the finest meshes the pressure within {INNER:g} a scatters by {100 * own['P2']:.2g} % of the "
-            f"peak on quadratic simplices, {100 * own['Q2']:.2g} % on quadratic bricks (most on {worst}, "
-            f"{100 * own[worst]:.2g} %); with contacts at all nodes of quadratic simplices it would be {100 * other:.2g} %."
+            f"peak on quadratic simplices, and by {100 * own['Q2']:.2g} % on quadratic bricks. It scatters most on {worst}, by "
+            f"{100 * own[worst]:.2g} %. If all nodes of quadratic simplices were contacts, it would be {100 * other:.2g} %."
         )
     return "\n".join(said)
 

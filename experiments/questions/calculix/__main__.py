@@ -130,9 +130,9 @@ def decay(sweep: list[dict[str, Any]], law: str) -> str:
     best = min(good, key=lambda row: row["normal, L2"])
     cut = [f"{row['factor']:.0e}" for row in good if row["attempts"] > 1]
     lost = [f"{row['factor']:.0e}" for row in sweep if row["contact"] == law and row["end"] != "converged"]
-    text = f"{law} like factor^{slope:.2f} from 10 to 1e5, least {best['normal, L2']:.0e} at {best['factor']:.0e}"
-    text += f", more than one attempt at {', '.join(cut)}" if cut else ""
-    return text + (f", no convergence at {', '.join(lost)}" if lost else ", converged at every factor")
+    text = f"With {law} contact it falls like factor^{slope:.2f} from 10 to 1e5, and is least at {best['factor']:.0e}, {best['normal, L2']:.0e}."
+    text += f" ccx needed more than one attempt at {' and '.join(cut)}." if cut else ""
+    return text + (f" It did not converge at {' and '.join(lost)}." if lost else " It converged at every factor.")
 
 
 def findings(check: dict[str, Any], sweep: list[dict[str, Any]], cost: list[dict[str, Any]]) -> str:
@@ -146,19 +146,19 @@ def findings(check: dict[str, Any], sweep: list[dict[str, Any]], cost: list[dict
     same = max(row["same law"] for row in converged(sweep, "node-to-surface"))
     size = max(row["contacts"] for row in cost)
     own, *others = (row for row in cost if row["contacts"] == size)
-    prices = "; ".join(
-        f"{row['solver'].removeprefix('ccx, ')} {row['over contactopt']:.0f} times as long, {row['iterations']} "
-        f"iterations, {row['memory [MB]']:.0f} MB"
+    prices = " ".join(
+        f"ccx with {row['solver'].removeprefix('ccx, ')} contact takes {row['over contactopt']:.0f} times as long, {row['iterations']} "
+        f"iterations and {row['memory [MB]']:.0f} MB."
         for row in others
     )
-    return f"""1. **Two independent codes agree.** Bonded, all displacements differ by {check["displacements, largest difference"]:.0e} of the largest: mesh,
+    return f"""1. **Two independent codes agree.** For bonded bodies all displacements differ by {check["displacements, largest difference"]:.0e} of the largest: mesh,
    thickness, supports and load are the same. With friction and ccx's mortar contact, hard and without a normal factor,
    {agreement}. Node-to-surface penalty, put into contactopt as a compliance
    added to Q, gives the same forces to {same:.0e} wherever ccx converged.
-2. **A penalty trades accuracy for convergence.** L2 error of the normal forces: {"; ".join(decay(sweep, law) for law in DECADES)}.
+2. **A penalty trades accuracy for convergence.** This is about the L2 error of the normal forces. {" ".join(decay(sweep, law) for law in DECADES)}
    contactopt has no factor to choose.
-3. **Cost.** At {size} contacts contactopt takes {own["seconds"]:.2g} s, {own["iterations"]} iterations, {own["memory [MB]"]:.0f} MB, Python included; ccx: {prices}.
-   Each iteration of ccx factorises both bodies anew, each of contactopt solves a dense system of the contact unknowns alone."""
+3. **Cost.** At {size} contacts contactopt takes {own["seconds"]:.2g} s, {own["iterations"]} iterations and {own["memory [MB]"]:.0f} MB, with Python. {prices}
+   Each iteration of ccx factorises both bodies anew. Each iteration of contactopt solves a dense system of the contact unknowns alone."""
 
 
 TEXT = """{findings}
