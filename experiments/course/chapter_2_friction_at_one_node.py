@@ -61,7 +61,7 @@ for tail, head, name, color in (
     ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
     ax.text((tail[0] + head[0]) / 2 + 0.06, (tail[1] + head[1]) / 2 + 0.08, name, color=color)
 ax.set(xlim=(-1.7, 2), ylim=(-0.6, 2.4), aspect="equal")
-ax.axis("off")
+_ = ax.axis("off")
 
 # %% [markdown]
 # The entry $Q_{nt} = -1$ of the compliance couples the two directions. A force to the right moves the node down as well,

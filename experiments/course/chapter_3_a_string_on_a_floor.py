@@ -48,7 +48,7 @@ for x_at, top, name, at in ((0.0, 0.25, "$d$", (0.012, 0.03)), (15 / 16, sag[15]
     ax.annotate("", (x_at, top), (x_at, 0), arrowprops={"arrowstyle": "<->", "color": "C2"})
     ax.text(*at, name, color="C2")
 ax.set(xlim=(-0.15, L + 0.15), ylim=(-0.075, 0.3))
-ax.axis("off")
+_ = ax.axis("off")
 
 # %% [markdown]
 # We put the stiffness of the string into a matrix $A$. Its row for node $i$ is $\tfrac{T}{h} (2 u_i - u_{i-1} - u_{i+1})$,

@@ -63,7 +63,7 @@ for head, name in (((2.7, 0.6), "$n$"), ((3.3, 0.0), "$t$")):
     ax.text(head[0] + 0.06, head[1] + 0.04, name)
 ax.annotate("", (0, -0.02), (0, -0.46), arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2})
 ax.text(0.08, -0.42, "$r_n$", color="C1")
-ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2.5, 3.6), ylim=(-0.5, 2.7))
+_ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2.5, 3.6), ylim=(-0.5, 2.7))
 
 # %% [markdown]
 # ## Primal: all displacements

@@ -51,7 +51,7 @@ for head, name in (((40, 6), "$t$"), ((28, 18), "$n$")):
 ax.plot(problem.coordinates[0], problem.coordinates[1], "k.", ms=3)
 ax.text(3, 20, "block")
 ax.text(3, -14, "foundation")
-ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48), ylim=(-26, 57))
+_ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48), ylim=(-26, 57))
 
 # %% [markdown]
 # ## Primal and dual for a given bound

@@ -55,7 +55,7 @@ ax.plot([-0.7, 0.7], [0, 0], "C3", lw=4)
 ax.text(0, -0.35, "contact, $-a < x < a$", color="C3", ha="center")
 ax.text(-1.9, 1.3, "rubber, below a rigid plate", color="C0", va="center")
 ax.set(xlim=(-2.1, 3.4), ylim=(-1.0, 2.5), aspect="equal")
-ax.axis("off")
+_ = ax.axis("off")
 
 # %%
 mu, P, T_most, D = 0.5, 100.0, 40.0, 400.0

@@ -59,7 +59,7 @@ for mu in (0.3, 0.6, 1.1):
         axes[0].plot(mu + step, solution.reactions[0, component] + step * slope[component], "k", lw=2.5)
 axes[0].plot([], [], "k", lw=2.5, label="slope from sensitivity")
 axes[0].legend(frameon=False, loc="center left", bbox_to_anchor=(0.0, 0.62))
-axes[1].legend(frameon=False)
+_ = axes[1].legend(frameon=False)
 
 # %% [markdown]
 # The curves consist of smooth pieces. In the left figure the node slips as long as $\mu$ is small. At $\mu = 5/6$ it begins to

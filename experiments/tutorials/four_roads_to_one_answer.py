@@ -60,7 +60,7 @@ for method, style in (("alternating", "o-"), ("tresca", "s-"), ("newton", "D-"))
     ax.semilogy(range(1, len(residuals) + 1), residuals, style, mfc="none", label=method)
     answers[method] = exact
 ax.set(xlabel="iteration [-]", ylabel="certificate: natural-map residual [-]")
-ax.legend(frameon=False)
+_ = ax.legend(frameon=False)
 
 # %% [markdown]
 # The two fixed-point iterations go down a straight line, because every iteration multiplies the error by the same number.
@@ -102,7 +102,7 @@ normal = np.array([0.97, 1.03]) * r[node, 0]
 ax.plot(np.sign(r[node, 1]) * 0.2 * normal, normal, "k--", lw=1, label=r"edge of the cone, $|r_t| = \mu\, r_n$")
 ax.plot(r[node, 1], r[node, 0], "k*", ms=12, label="solution")
 ax.set(xlabel="friction force $r_t$ [N]", ylabel="normal force $r_n$ [N]")
-ax.legend(frameon=False)
+_ = ax.legend(frameon=False)
 
 # %% [markdown]
 # ## The fourth road

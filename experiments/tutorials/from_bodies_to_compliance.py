@@ -190,7 +190,7 @@ for count, marker in ((17, "s"), (33, "o"), (65, "^")):
     assert np.all(np.abs(eigenvalues[2 : count // 4] / predicted(count)[1 : count // 4 - 1] - 1) < 0.25)
 ax.loglog(np.arange(1, 65), predicted(65) * 4 / 64, "k--", lw=1, label=r"half-planes, $2 / (E^* \xi_j)$")
 ax.set(xlabel="number j of the wave [-]", ylabel=r"eigenvalue of $Q_{nn}$ times h [mm$^2$/N]")
-ax.legend(frameon=False)
+_ = ax.legend(frameon=False)
 
 # %% [markdown]
 # On every mesh we see a straight line of slope $-1$. It bends only where the waves are too short for the mesh. Each

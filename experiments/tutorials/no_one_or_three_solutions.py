@@ -43,7 +43,7 @@ for tail, head, name, color, at in (
     ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
     ax.text(*at, name, color=color, fontsize=12)
 ax.set(xlim=(-2.2, 2.4), ylim=(-0.5, 2.2), aspect="equal")
-ax.axis("off")
+_ = ax.axis("off")
 
 # %%
 K = np.array([[4.0, -1.5], [-1.5, 1.0]])  # N / mm; normal component first
@@ -142,7 +142,7 @@ for mu in (0.6, 0.7, 1.0):
     ax.step(angles, number, where="mid", label=rf"$\mu$ = {mu}")
     assert max(number) == (1 if mu < 2 / 3 else 3)
 ax.set(xlabel="direction of the load [degrees from horizontal]", ylabel="number of solutions [-]", yticks=[1, 2, 3])
-ax.legend(frameon=False)
+_ = ax.legend(frameon=False)
 
 # %% [markdown]
 # Just above the threshold only loads in a narrow sector have three solutions. With more friction the sector becomes wider.

@@ -48,7 +48,7 @@ for tail, head, name, color, at in (
 ax.text(-1.1, 1.75, "elastic body", color="C0")
 ax.text(-1.9, -0.32, "floor", color="0.3")
 ax.set(xlim=(-2, 2.6), ylim=(-0.5, 2.4), aspect="equal")
-ax.axis("off")
+_ = ax.axis("off")
 
 # %% [markdown]
 # The arrows show the positive directions. The body is linear, so the displacement depends on the force by a small

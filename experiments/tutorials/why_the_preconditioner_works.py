@@ -122,7 +122,7 @@ for name, P in choices.items():
     assert np.all((symbol / number > 0.2) & (symbol / number < 5))
 ax.loglog(number, number, "k--", lw=1, label="proportional to the wave number")
 ax.set(xlabel="number of the wave [-]", ylabel="what the preconditioner multiplies it by [-]")
-ax.legend(frameon=False)
+_ = ax.legend(frameon=False)
 
 # %% [markdown]
 # All of them follow the dashed line within a constant factor, and no more is needed. If $c_1 |\xi| \le$ symbol
