@@ -3,6 +3,8 @@
 ALONG was chosen for small condition numbers of `laplacian` on the disc of
 `python -m experiments.questions.contact_surfaces`, whose other surfaces judge it (reports/contact_surfaces/report.md).
 
+EIGENVECTORS was chosen by the times that `python -m experiments.questions.contact_surfaces` prints.
+
 SOFT, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the bodies of
 `python -m experiments.questions.preconditioners` (reports/preconditioners.md). On bodies that had no part in that fit, `neumann` is
 judged by `python -m experiments.questions.preconditioners_unseen` (reports/preconditioners_unseen/report.md).
@@ -13,3 +15,6 @@ ALONG = 2.0  # resistance of `laplacian` to tangential waves along their own dir
 SOFT = 0.28  # share by which bilinear elements lower the compliance of the shortest tangential waves along their own direction
 CELL = 0.45  # power of a node's cell that weights it on a surface: 1/2 where the spacing varies slowly
 EDGE = 0.2  # power of the share of the cell that an edge leaves: 0 for a half-space, 1/4 and more for a quarter-space
+EIGENVECTORS = (
+    1200  # unknowns up to which `laplacian` computes them: the third of a second that this takes is won in 60 products
+)
