@@ -20,14 +20,14 @@ half-width. The finer side carries the contacts, unless a column says otherwise.
 
 ## Exact to rounding
 
-A uniform pressure crosses the interface between blocks of quadrilaterals or bricks. The columns are ratios of the spacings. The table has
+A uniform pressure crosses the interface between blocks of quadrilaterals or bricks. The last three columns are ratios of the spacings. The table has
 the largest relative error of the pressure at any contact, whichever side carries the contacts:
 
 {patch}
 
 The next table has the sum of all nodal forces on both bodies, and of their moments. Both are relative to the sum of the sizes of the
-contact forces and to the extent of the bodies. One column is for the solution. The other is for random contact forces on the
-same curved surfaces, with none on planes of symmetry:
+contact forces and to the extent of the bodies. The columns `solved` are for the solution. The columns `random forces` are for random
+contact forces on the same curved surfaces, with none on planes of symmetry:
 
 {equilibrium}
 
@@ -55,8 +55,8 @@ needs no mesh, with an elastic punch that is 1e7 times as stiff and has a mesh t
 
 The fourth table has Cattaneo and Mindlin: cylinders are pressed, and then sheared in one step. Errors are root mean squares over several shears, with
 their ratios to those of matching meshes of 20:20. In some rows the meshes have nodes at the edges of stick (three shears, each with its
-own meshes). Matching nodes gain from this, because both bodies have their kinks there, and a finer side does not. In the rows "nodes
-anywhere" there are four shears, on meshes that were made for another shear.
+own meshes). Matching nodes gain from this, because both bodies have their kinks there, and a finer side does not. In the rows
+`anywhere` there are four shears, on meshes that were made for another shear.
 
 {cattaneo}
 
