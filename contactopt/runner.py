@@ -15,6 +15,7 @@ import numpy as np
 from contactopt.analysis.accuracy import Estimate, refine
 from contactopt.analysis.paths import PathResult, solve_states
 from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
+from contactopt.analysis.resolution import remarks
 from contactopt.analysis.resultants import tables
 from contactopt.analysis.solve_scene import Options, Solved
 from contactopt.bodies.ranks import Team, spread
@@ -366,6 +367,7 @@ def _summary(
         "pressure": peak_pressure(reduction, solution) if single else None,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
+        "remarks": list(remarks(reduction, solution)),
         **found,
     }
     if path is not None:

@@ -74,9 +74,10 @@ def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
     """Read the half-width of the contact zone.
 
     Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against x^2 over the outer
-    part of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than
-    three nodes are left, and where the other end is a corner, a straight line goes through the rings of nodes next to
-    the edge. Where every node touches, or where contact ends at a corner, the edge is that of the contact surface.
+    part of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than three
+    nodes are left, and where the other end is a corner, a straight line goes through the rings of nodes next to the edge.
+    Where every node touches, or where contact ends at a corner, the edge is that of the contact surface. A reading on a
+    surface counts only where the disc of that radius has the area of the zone to within an element.
 
     Parameters
     ----------
@@ -171,6 +172,8 @@ def _half_width(
     if not found or any(patch is None for patch in found):
         return counted, 0.0
     ends = [patch for patch in found if patch is not None]
+    if problem.dim == 3 and abs(ends[0].last - np.sqrt(problem.areas[inside].sum() / np.pi)) > ends[0].step:
+        return counted, 0.0  # no disc: the zone reaches the rim of the surface on some sides, or is long
     uncertainty = sum(patch.copies * patch.uncertainty for patch in ends)
     if scene.kind == "axisymmetric":  # a ring between two distances from the axis, or a disc
         squares = (abs(patch.last**2 - (patch.first**2 if patch.first > 0 or patch.last < 0 else 0)) for patch in ends)

@@ -25,12 +25,16 @@ Window = tuple[int, int]  # rings of nodes next to the edge: how many are left o
 
 @dataclass(frozen=True)
 class Ends:
-    """Where a patch begins and ends along its line [length]; `copies` of it make the whole zone."""
+    """Where a patch begins and ends along its line [length]; `copies` of it make the whole zone.
+
+    step  distance of neighbouring contacts next to its end [length]
+    """
 
     first: float
     last: float
     copies: int
     uncertainty: float
+    step: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +109,7 @@ class Patch:
         first, last, uncertainty = float(x.min()), float(x.max()), 0.0
         if self.centred:
             found = self._read(1.0, 0.0, read)
-            return None if found is None else Ends(-found[0], found[0], self.copies, found[1])
+            return None if found is None else Ends(-found[0], found[0], self.copies, found[1], self._step_at(last))
         for _ in range(ROUNDS):
             centre = (first + last) / 2
             left, right = self._read(-1.0, centre, read), self._read(1.0, centre, read)
@@ -115,7 +119,10 @@ class Patch:
             uncertainty = (left[1] + right[1]) / 2
             if max(abs(first - before[0]), abs(last - before[1])) <= CENTRE * (last - first):
                 break
-        return Ends(first, last, self.copies, uncertainty)
+        return Ends(first, last, self.copies, uncertainty, self._step_at(last))
+
+    def _step_at(self, edge: float) -> float:
+        return self.step(self.contact, self.place, edge)
 
     def _read(self, sign: float, centre: float, read: Callable[[End], list[float]]) -> tuple[float, float] | None:
         """Distance of one end from the centre and its uncertainty [length]."""

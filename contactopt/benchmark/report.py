@@ -307,8 +307,8 @@ def _foot(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
     lines = [
         f"{len(table)} runs, of which {failures} did not keep their tolerance. Every success is a certificate recomputed from "
         "the problem.",
-        f"Wall over CPU time of the calls: median {(table['call_seconds'] / table['cpu_seconds']).median():.1f} (more than 1: a busy "
-        "machine; CPU times are compared, time limits are wall).",
+        f"The median of wall time over CPU time of the calls is {(table['call_seconds'] / table['cpu_seconds']).median():.1f}. More "
+        "than 1 means a busy machine. CPU times are compared, and time limits are wall times.",
         f"Experiment: [`{layout.path.name}`]({link}); table: [`{name}`]({name}).",
         f"Made by {again}."
         if kept

@@ -196,7 +196,7 @@ def straight(mesh: skfem.Mesh) -> skfem.Mesh:
     """
     if not is_curved(mesh):
         return mesh
-    plain = SHAPES[mesh.refdom.__name__][0](mesh.p[:, : mesh.nvertices], mesh.t)
+    plain = SHAPES[mesh.refdom.__name__][0](np.ascontiguousarray(mesh.p[:, : mesh.nvertices]), mesh.t)
     return plain.with_boundaries(mesh.boundaries) if mesh.boundaries else plain
 
 

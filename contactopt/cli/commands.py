@@ -116,6 +116,8 @@ def _print_result(result: Any, out: str) -> None:
             f"contact half-width {s['contact_half_width']:.6g} {length}, "
             f"stick half-width {s['stick_half_width']:.6g} {length}"
         )
+    for remark in s["remarks"]:
+        print(f"note: {remark}")
     if result.estimate is not None:
         _print_estimate(result.estimate)
     seconds = s["seconds"]

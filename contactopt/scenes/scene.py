@@ -463,7 +463,7 @@ class Scene:
                 or len(load.value) != self.dim
             ):
                 raise InputError(
-                    f"body '{part.name}': a {type(load).__name__} needs {self.dim} values "
+                    f"body '{part.name}': a {type(load).__name__} needs a tuple of {self.dim} values "
                     f"({', '.join(self.components)}); got {short(load.value)}."
                 )
             else:
@@ -474,7 +474,10 @@ class Scene:
 
     def _check_components(self, body: str, values: Mapping[str, float]) -> None:
         if not isinstance(values, Mapping):
-            raise InputError(f"body '{body}': a value is given for each component by its name; got {short(values)}.")
+            raise InputError(
+                f"body '{body}': a value is given for each component by its name, as in "
+                f"{{{self.components[-1]!r}: 0.0}}; got {short(values)}."
+            )
         for component, value in values.items():
             if component not in self.components:
                 others = [kind for kind, names in COMPONENTS.items() if component in names]

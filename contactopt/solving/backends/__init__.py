@@ -99,7 +99,7 @@ QP: dict[str, Backend] = {
             "qp",
             "proxsuite",
             "proxsuite",
-            {"eps_abs": TIGHT, "eps_rel": 0.0, "max_iter": 10_000},
+            {"eps_abs": TIGHT, "eps_rel": 0.0, "max_iter": 1_000},
             steps="max_iter",
         ),
         Backend("clarabel", "qp", "clarabel", "clarabel", _CLARABEL, sparse=True, clock="time_limit"),

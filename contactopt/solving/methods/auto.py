@@ -154,17 +154,26 @@ class Auto:
     def _newton(
         problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
     ) -> Generator[Iterate | Known, None, Iterate]:
-        """Newton's iterates; returns the best. What comes next needs the entries of Q: not before they cost no more."""
-        best, reached, since = np.inf, start, 0
+        """Newton's iterates; returns the best. What comes next needs the entries of Q: not before they cost no more.
+
+        A start that leads nowhere is given up for the solution of the bonded problem, from which Newton's method begins
+        where it has none.
+        """
+        best, reached = np.inf, start
         operator = problem.Q if isinstance(problem.Q, InterfaceOperator) else None
-        for steps, (point, residual) in enumerate(Newton(preconditioner=preconditioner).steps(problem, start)):
-            yield point
-            since = 0 if residual < PROGRESS * best else since + 1
-            if residual < best:
-                best, reached = residual, point[:2]
-            tired = since >= PATIENCE or steps >= NEWTON_STEPS
-            if tired and (operator is None or operator.products >= problem.q.size):
-                break
+        for begin in (start, None) if start is not None else (None,):
+            least, since = np.inf, 0
+            for steps, (point, residual) in enumerate(Newton(preconditioner=preconditioner).steps(problem, begin)):
+                yield point
+                since = 0 if residual < PROGRESS * least else since + 1
+                least = min(least, residual)
+                if residual < best:
+                    best, reached = residual, point[:2]
+                tired = since >= PATIENCE or steps >= NEWTON_STEPS
+                if tired and (begin is not None or operator is None or operator.products >= problem.q.size):
+                    break
+            if begin is not None:
+                note(logger, "Newton's method made no progress from the given start and begins anew without it")
         return reached or cold_start(problem)
 
     @staticmethod

@@ -13,7 +13,8 @@ tangential fields u and v, which couples both components.
 At an edge M is what a contact inside would have, and the share of it that is there enters with the power EDGE, as in
 `neumann`. The shift keeps constants, which a Neumann Laplacian maps to zero; it belongs to each connected piece of the surface.
 Components that cannot move are left out. The inverse root is a rational function whose error falls exponentially with the
-number of its poles: each of them is one sparse factorisation of a matrix of the surface.
+number of its poles: each of them is one sparse factorisation of a matrix of the surface. On a surface of few contacts the
+eigenvectors of L take less time than those factors, and so does a product with them.
 
 Source: Hale, Higham, Trefethen (2008), Computing A^alpha, log(A), and related matrix functions by contour integrals,
 method 3 for the square root. Johnson (1985), Contact mechanics, section 3.6, for the compliance of the half-space.
@@ -25,13 +26,14 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import eigh
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 from scipy.special import ellipj, ellipk, ellipkm1
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
-from contactopt.solving.preconditioners.constants import ALONG, DISTORTED, EDGE, PIECE, SPLIT, THINNEST
+from contactopt.solving.preconditioners.constants import ALONG, DISTORTED, EDGE, EIGENVECTORS, PIECE, SPLIT, THINNEST
 
 ACCURACY = 1e-4  # of the rational function
 
@@ -205,15 +207,24 @@ def _square_root(K: sp.csr_matrix, values: np.ndarray, moves: np.ndarray) -> Roo
     weight = np.sqrt(full * depth) * share**EDGE
     scale = sp.diags(full**-0.5)
     L = sp.csc_matrix(scale @ K[moves][:, moves] @ scale + sp.diags(shift))
-    low, high = float(shift.min()), float(abs(L).sum(axis=1).max())
+    root = _by_eigenvectors(L) if L.shape[0] <= EIGENVECTORS else _by_poles(L, float(shift.min()))
+    return lambda x: weight * (L @ root(weight * x)), lambda x: root(x / weight) / weight
+
+
+def _by_eigenvectors(L: sp.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
+    """Products with L^-1/2, an array: the fewest operations for each product where L is small."""
+    values, vectors = eigh(L.toarray())
+    dense = (vectors / np.sqrt(values)) @ vectors.T
+    return lambda x: np.asarray(dense @ x)
+
+
+def _by_poles(L: sp.csc_matrix, low: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Products with L^-1/2, a sum of sparse solves, for L with eigenvalues of at least `low`."""
     eye = sp.eye(L.shape[0], format="csc")
     order = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    high = float(abs(L).sum(axis=1).max())
     poles = [(c, splu(L + s * eye, **order)) for c, s in zip(*inverse_root(low, high))]
-
-    def root(x: np.ndarray) -> np.ndarray:
-        return np.asarray(sum(c * factors.solve(x) for c, factors in poles))
-
-    return lambda x: weight * (L @ root(weight * x)), lambda x: root(x / weight) / weight
+    return lambda x: np.asarray(sum(c * factors.solve(x) for c, factors in poles))
 
 
 def inverse_root(low: float, high: float, accuracy: float = ACCURACY) -> tuple[np.ndarray, np.ndarray]:
