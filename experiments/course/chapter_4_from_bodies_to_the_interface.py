@@ -18,7 +18,7 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from contactopt import InterfaceProblem, Material, Part, Rigid, Scene, Traction, natural_map_residual, reduce, solve
 from contactopt.problem.laws.tresca import Tresca
-from contactopt.teaching import check
+from contactopt.teaching import Slider, check
 
 # %% [markdown]
 # ## The mechanical system
@@ -150,6 +150,25 @@ answer = solve(frictionless)
 
 assert np.allclose(r_n.value, pressed, atol=1e-4)
 assert answer.solved and np.allclose(answer.reactions[:, 0], pressed, atol=1e-4)
+
+# %% [markdown]
+# Without contact forces the displacements of the block are proportional to the motion of the plate. So if the plate comes down
+# further, only $q$ changes, and $Q$ stays the same. The slider shows how the contact grows.
+
+
+# %% tags=["hide-input"]
+def further_down(depth):
+    without_contact = depth / lowered * (T @ U_0).reshape(-1, 2) + np.column_stack([gap, 0 * gap])
+    forces = solve(InterfaceProblem(Q, without_contact, 0.0)).reactions[:, 0]
+    order = np.argsort(x)
+    fig, ax = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
+    ax.plot(x[order], forces[order] / (4 / 32), "C0.-")
+    ax.set(xlabel="x [mm]", ylabel="pressure [MPa]", ylim=(-0.05, 0.8))
+    ax.set_title(f"the floor carries {forces.sum():.2f} N")
+    return fig
+
+
+Slider("the plate comes down by [mm]", np.linspace(0.02, 0.2, 10), further_down, start=4)
 
 # %% [markdown]
 # ## Nitsche's method with finite elements
