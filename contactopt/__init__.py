@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from contactopt.analysis.diagnosis import Diagnosis, diagnose
     from contactopt.analysis.enumeration import all_solutions
     from contactopt.analysis.paths import PathResult, follow
+    from contactopt.analysis.simplest.report import Simplification, Simplified, simplify
     from contactopt.analytic import Reference
     from contactopt.bodies.fields import Fields
     from contactopt.derivatives.design import Design, design
@@ -41,6 +42,7 @@ _HOMES = {
     "analysis.diagnosis": ("Diagnosis", "diagnose"),
     "analysis.enumeration": ("all_solutions",),
     "analysis.paths": ("PathResult", "follow"),
+    "analysis.simplest.report": ("Simplification", "Simplified", "simplify"),
     "derivatives.design": ("Design", "design"),
     "derivatives.fit": ("Fit", "fit"),
     "derivatives.gradient": ("gradient",),

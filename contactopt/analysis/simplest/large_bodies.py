@@ -1,0 +1,182 @@
+"""Half-spaces instead of bodies that are large beside their contact.
+
+One coarse solve gives the half-width a of the contact, the total force, and the gap about it, which a polynomial of the distance
+continues. Two errors remain for the peak pressure, both measured on Hertz's contact (contactopt.analysis.simplest.estimates): that of
+a body that ends at the distance L from the contact, FINITE (a / L)^2, and that of a surface that is not flat, STEEP times the square of
+its slope at the edge of the contact. The approach is not the same: it depends on the whole bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contactopt.analysis.simplest.estimates import ACROSS, FINITE, REACH, STEEP
+from contactopt.analysis.solve_scene import Solved
+from contactopt.analysis.status import contact_status
+from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
+
+FLAT = 0.95  # cosine between the contact normals inside the contact and their mean, at least
+RINGS = 2.0  # contact half-widths about the middle whose gaps the polynomial follows
+FEWEST = 8  # contacts inside the contact for its shape to be known
+ROUGH = 0.02  # of the indentation: how well the polynomial must follow the gap
+MIDDLE = 0.05  # of the half-width: how far from the middle the pressure may lie to one side
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """The contact as a coarse solve shows it.
+
+    half_width  of the contact [length];   force  total normal force;  shear  total tangential force along the first tangent
+    gap         the initial gap as a function of the distance from the middle (in 2D the place along the line)
+    size        distance from the contact to the nearest end of an elastic body [length]
+    slope       of the gap at the edge of the contact [-];   misfit  of the gap over the indentation [-]
+    """
+
+    half_width: float
+    force: float
+    shear: float
+    gap: Callable[[np.ndarray], np.ndarray]
+    size: float
+    slope: float
+    misfit: float
+
+    @property
+    def error(self) -> float:
+        """Estimated relative error of the peak pressure."""
+        return FINITE * (self.half_width / self.size) ** 2 + STEEP * self.slope**2 + self.misfit
+
+
+def spot_of(solved: Solved) -> Spot | str:
+    """The contact of a solved scene, or half a sentence that says why it is none of half-spaces."""
+    scene, problem = solved.reduction.scene, solved.reduction.problem
+    if len(scene.pairs) != 1 or any(isinstance(part, HalfSpace) for part in scene.parts):
+        return "it is offered for one pair of surfaces of bodies with meshes"
+    if callable(scene.pairs[0].mu) or np.ndim(scene.pairs[0].mu):
+        return "the friction depends on the place"
+    if scene.pairs[0].law not in ("coulomb", "frictionless"):
+        return f"the law '{scene.pairs[0].law}' binds all of the surface"
+    r = solved.solution.reactions
+    touching = contact_status(problem, r).touching
+    if touching.sum() < FEWEST:
+        return "the mesh is too coarse to show the shape of the contact"
+    if touching.all() or problem.chart.closed:
+        return "the contact fills all of its surface, so that its edge is that of a body"
+    frames = solved.reduction.frames
+    mean = problem.areas @ frames[:, 0]
+    mean = mean / np.linalg.norm(mean)
+    if np.any(frames[touching, 0] @ mean < FLAT):
+        return "the surfaces turn by too much inside the contact"
+    return _spot(solved, touching, mean)
+
+
+def _spot(solved: Solved, touching: np.ndarray, mean: np.ndarray) -> Spot | str:
+    reduction, problem, r = solved.reduction, solved.reduction.problem, solved.solution.reactions
+    places, number = problem.chart.images()
+    weight = r[number, 0] / np.maximum(problem.areas[number], 1e-300)
+    share = problem.areas[number] * weight
+    round_about = reduction.scene.kind == "axisymmetric"
+    middle = np.zeros(len(places)) if round_about else places @ share / share.sum()
+    distance = np.linalg.norm(places - middle[:, None], axis=0)
+    half_width = float(distance[touching[number]].max())
+    if not 0 < half_width < 0.95 * distance.max():
+        return "the contact reaches to the end of its surface"
+    fitted = _gap(distance, reduction.gap[number], half_width)
+    if isinstance(fitted, str):
+        return fitted
+    gap, slope, misfit = fitted
+    size = _size(solved, touching, half_width)
+    force = float(r[:, 0].sum())
+    shear = 0.0 if round_about or reduction.scene.copies > 1 else float(r[:, 1].sum())
+    return Spot(half_width, force, shear, gap, size, slope, misfit)
+
+
+def _gap(
+    distance: np.ndarray, gap: np.ndarray, a: float
+) -> tuple[Callable[[np.ndarray], np.ndarray], float, float] | str:
+    """An even polynomial of fourth degree through the gap within RINGS half-widths, its slope at the edge, its misfit."""
+    near = distance <= RINGS * a
+    s = distance[near] / a
+    terms = np.stack([np.ones_like(s), s**2, s**4], axis=1)
+    if len(np.unique(np.round(s, 6))) < 5:
+        return "the mesh is too coarse to show the gap about the contact"
+    c, *_ = np.linalg.lstsq(terms, gap[near], rcond=None)
+    if c[1] <= 0:
+        return "the gap does not grow from the middle of the contact"
+    indentation = float(c[1] + c[2])
+    misfit = float(np.abs(terms @ c - gap[near]).max() / max(2 * indentation, 1e-300))
+    if misfit > ROUGH:
+        return "the gap about the contact is no smooth function of the distance from its middle"
+
+    def function(d: np.ndarray) -> np.ndarray:
+        return np.asarray(c[1] * (d / a) ** 2 + c[2] * (d / a) ** 4)
+
+    return function, float(2 * c[1] + 4 * c[2]) / a, misfit
+
+
+def _size(solved: Solved, touching: np.ndarray, a: float) -> float:
+    """Distance from the contact to the nearest boundary of an elastic body that is not next to it [length]."""
+    reduction = solved.reduction
+    points = reduction.problem.coordinates[:, touching]
+    least = np.inf
+    planes = [plane for made in reduction.couplings for plane in made.planes]
+    scene = reduction.scene
+    for part in (part for part in scene.parts if isinstance(part, Part)):
+        mesh = part.build_mesh(scene.elements, scene.zone)
+        surface = np.concatenate([mesh.boundaries[name] for name in scene.surfaces_of(part)])
+        facets = np.setdiff1d(mesh.boundary_facets(), surface)
+        middles = mesh.p[:, mesh.facets[:, facets]].mean(axis=1)
+        inner = np.zeros(middles.shape[1], dtype=bool)
+        for plane in planes:
+            inner |= plane.contains(middles, float(np.ptp(mesh.p, axis=1).max()))
+        if scene.kind == "axisymmetric":
+            inner |= np.abs(middles[0]) < 1e-9 * np.ptp(mesh.p[0])
+        middles = middles[:, ~inner]
+        if middles.size:
+            centre = points.mean(axis=1, keepdims=True)
+            least = min(least, float(np.linalg.norm(middles - centre, axis=0).min()))
+    return float(least)
+
+
+def _part(scene: Scene, name: str) -> Any:
+    return next(part for part in scene.parts if part.name == name)
+
+
+def as_half_spaces(scene: Scene, spot: Spot) -> Scene:
+    """The contact between half-spaces, with the same materials, friction and total force, in axes of its own."""
+    dim = 2 if scene.kind == "plane-strain" else 3
+    components = ("x", "y", "z")
+    reach = REACH * spot.half_width
+
+    def points(elements: int, zone: float | None) -> tuple[np.ndarray, ...]:
+        count = 2 * int(np.ceil(REACH * elements))
+        row = (np.arange(count) + 0.5) * (2 * reach / count) - reach
+        return (row,) * (dim - 1)
+
+    def gap(x: np.ndarray) -> np.ndarray:
+        return spot.gap(np.linalg.norm(x[: dim - 1], axis=0))
+
+    pair = scene.pairs[0]
+    upper, lower = (_part(scene, name) for name in pair.bodies)
+    total = {components[dim - 1]: -spot.force}
+    if spot.shear:
+        total["x"] = spot.shear
+    top: Any = Rigid(upper.name, gap=gap, force=total)
+    if isinstance(upper, Part):
+        top = HalfSpace(upper.name, upper.material, points, height=lambda x: -gap(x), force=total)
+    bottom: Any = Rigid(lower.name) if not isinstance(lower, Part) else HalfSpace(lower.name, lower.material, points)
+    return Scene(
+        f"{scene.name} as half-spaces",
+        top,
+        bottom,
+        pair.mu,
+        kind="plane-strain" if dim == 2 else "solid",
+        thickness=scene.thickness,
+        law=pair.law,
+        elements=ACROSS[dim],
+        units=scene.units,
+        reference=scene.reference,
+    )

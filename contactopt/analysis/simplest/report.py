@@ -1,0 +1,391 @@
+"""What may be left out of a scene: the search through all kinds of simplification, and its report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from contactopt.analysis.simplest import joints, large_bodies
+from contactopt.analysis.simplest.cutting import crosses, half_of, is_mirrored, side_of
+from contactopt.analysis.simplest.estimates import WORST
+from contactopt.analysis.simplest.mirrors import Images, Mirror, Plane, find_mirrors, images_under
+from contactopt.analysis.simplest.sections import axisymmetric, plane_strain, prism, revolution
+from contactopt.analysis.simplest.shapes import Shapes, shapes_of, sizes_of
+from contactopt.analysis.simplest.turning import turned
+from contactopt.analysis.solve_scene import Solved
+from contactopt.cards import card, count, line
+from contactopt.errors import InputError
+from contactopt.scenes.scene import Scene
+
+PARTS = {2: "half", 4: "quarter", 8: "eighth"}
+UNIQUE = "Exact wherever the solution is unique."
+
+
+@dataclass(frozen=True, eq=False)
+class Simplification:
+    """Something that may be left out of a scene.
+
+    name      'plane strain', 'axisymmetry', 'mirror symmetry', 'half-spaces', 'tied contacts' or 'frictionless contacts'
+    what      one sentence that says what is left out
+    why       one or two sentences that say why, and how the error is known
+    error     relative error that it makes: 0.0 where it is exact, None where it is not known
+    before, after   (unknowns, contacts) of the scene that it is applied to, and of the simplified one, counted from their meshes
+    scene     the simplified scene; None where the mesh has to be made anew by hand
+    check     function of the solved simplified scene that says in a sentence whether what was assumed holds; None where
+              nothing was assumed
+    """
+
+    name: str
+    what: str
+    why: str
+    error: float | None
+    before: tuple[int, int]
+    after: tuple[int, int] | None = None
+    scene: Scene | None = field(default=None, repr=False)
+    check: Callable[[Solved], str] | None = field(default=None, repr=False)
+
+    @property
+    def exact(self) -> bool:
+        """Whether it makes no error."""
+        return self.error == 0.0
+
+    @property
+    def price(self) -> str:
+        """What it leaves, and what the error is, in words."""
+        error = (
+            "no error" if self.exact else "error not known" if self.error is None else f"error about {self.error:.1e}"
+        )
+        if self.after is None:
+            return error
+        (n, k), (m, c) = self.before, self.after
+        return f"{n} -> {count(m, 'unknown')}, {k} -> {count(c, 'contact')}, {error}"
+
+    def __repr__(self) -> str:
+        return line("Simplification", self.name, self.price)
+
+
+@dataclass(frozen=True, eq=False)
+class Simplified:
+    """What simplify() found.
+
+    given    the scene that was asked about
+    scene    the scene after all exact simplifications, one after the other; the given one if there are none
+    found    the simplifications; the exact ones come first, and each begins with the scene that the one before leaves. The
+             others begin with `scene`
+    notes    sentences about what nearly was a simplification, and what spoils it
+    """
+
+    given: Scene
+    scene: Scene
+    found: tuple[Simplification, ...]
+    notes: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Simplification:
+        """The last simplification of that name, which contains those before it."""
+        for each in reversed(self.found):
+            if each.name == name:
+                return each
+        known = ", ".join(dict.fromkeys(each.name for each in self.found)) or "none"
+        raise InputError(f"scene '{self.given.name}' has no simplification {name!r}; found were: {known}.")
+
+    @property
+    def needs(self) -> str:
+        """One sentence: what is enough for this scene."""
+        exact = [each for each in self.found if each.exact and each.scene is not None]
+        if not exact:
+            return f"Scene '{self.given.name}' needs all of its model: nothing can be left out exactly."
+        unknowns, contacts = exact[-1].after or exact[-1].before
+        first = exact[0].before
+        return (
+            f"Scene '{self.given.name}' needs no more than {_model(self.given, self.scene)}: "
+            f"{count(unknowns, 'unknown')} instead of {first[0]}, {count(contacts, 'contact')} instead of {first[1]}."
+        )
+
+    def __str__(self) -> str:
+        lines = [self.needs]
+        for each in self.found:
+            lines += ["", f"{each.name}: {each.what}", f"  {each.why}", f"  {each.price}"]
+            if each.scene is None:
+                lines[-1] += "; make this mesh anew to apply it"
+        return "\n".join([*lines, *(["", *self.notes] if self.notes else [])])
+
+    def __repr__(self) -> str:
+        return line("Simplified", self.given.name, *(f"{each.name} ({each.price})" for each in self.found))
+
+    def _repr_html_(self) -> str:
+        rows: dict[str, object] = {}
+        for number, each in enumerate(self.found, 1):
+            rows[f"{number}. {each.name}"] = f"{each.what} {each.why} {each.price}."
+        rows |= {f"note {number}": note for number, note in enumerate(self.notes, 1)}
+        return card(self.needs, rows)
+
+
+def simplify(scene: Scene, solve: bool = True) -> Simplified:
+    """Say what may be left out of a scene before it is solved, why, and with which error.
+
+    Parameters
+    ----------
+    scene
+        Of elastic and rigid bodies. Scenes of half-spaces are returned as they are.
+    solve
+        Whether to solve the scene once on a coarse mesh, which shows contacts that neither open nor slip, contacts whose
+        friction hardly acts, and contacts that are small beside their bodies. Without it only exact simplifications are
+        looked for. A mesh that is given is not made coarser.
+
+    Returns
+    -------
+    Simplified
+        A report that prints as text, with the simplified scenes.
+
+    Raises
+    ------
+    InputError
+        For something else than a scene, and for a scene that cannot be modelled.
+    """
+    if not isinstance(scene, Scene):
+        raise InputError(f"the scene must be a Scene; got {type(scene).__name__}.")
+    shapes = shapes_of(scene)
+    if shapes is None:
+        return Simplified(scene, scene, (), ("Half-spaces have no mesh, and nothing that could be left out.",))
+    found: list[Simplification] = []
+    notes: list[str] = []
+    simple, told = _section(shapes)
+    found, notes = [*found, *simple], [*notes, *told]
+    shapes = _shapes(simple, shapes)
+    simple, told = _mirrored(shapes)
+    found, notes = [*found, *simple], [*notes, *told]
+    shapes = _shapes(simple, shapes)
+    if solve:
+        simple, told = _solved(shapes.scene)
+        found, notes = [*found, *simple], [*notes, *told]
+    return Simplified(scene, shapes.scene, tuple(found), tuple(notes))
+
+
+def _shapes(found: list[Simplification], before: Shapes) -> Shapes:
+    """The shapes of the last scene that was made."""
+    scenes = [each.scene for each in found if each.scene is not None]
+    made = shapes_of(scenes[-1]) if scenes else before
+    assert made is not None
+    return made
+
+
+def _model(given: Scene, scene: Scene) -> str:
+    """'a quarter of the bodies in plane strain'."""
+    part = PARTS.get(scene.copies // given.copies, "")
+    kind = {"plane-strain": "in plane strain", "axisymmetric": "in an axisymmetric section", "solid": ""}[scene.kind]
+    bodies = (
+        f"one {part} of the bodies"
+        if part
+        else "the section of the bodies"
+        if scene.kind != given.kind
+        else "the bodies"
+    )
+    if part and given.copies > 1:
+        bodies = f"one {part} of what is modelled"
+    return f"{bodies} {kind}".strip() if scene.kind != given.kind else bodies
+
+
+def _section(shapes: Shapes) -> tuple[list[Simplification], list[str]]:
+    """Plane strain or axisymmetry instead of a solid."""
+    before = sizes_of(shapes.scene)
+    round_about = revolution(shapes)
+    if round_about is not None:
+        point, axis, reason = round_about
+        where = f"the line through {_place(point)} along {_place(axis)}"
+        if reason:
+            return [], [f"The bodies are of revolution about {where}, but {reason}."]
+        what = "The section on one side of the axis stands for the bodies."
+        why = f"Bodies, supports, loads and laws fit themselves after any turn about {where}. {UNIQUE}"
+        return [_tried("axisymmetry", what, why, before, lambda: axisymmetric(shapes, point, axis))], []
+    straight = prism(shapes)
+    if straight is None:
+        return [], []
+    axis, reason = straight
+    where = _direction(axis, shapes.scene.components)
+    if reason:
+        return [], [
+            f"The bodies are prisms along {where}, but {reason}; plane strain is no more than an approximation."
+        ]
+    what = "A section in plane strain stands for the bodies."
+    why = f"The bodies are prisms along {where}, their ends are held along it, and nothing changes or acts along it. {UNIQUE}"
+    return [_tried("plane strain", what, why, before, lambda: plane_strain(shapes, axis))], []
+
+
+def _tried(name: str, what: str, why: str, before: tuple[int, int], make: Callable[[], Scene]) -> Simplification:
+    """An exact simplification with its scene, or without one and the reason why it cannot be made."""
+    try:
+        scene = make()
+    except InputError as error:
+        return Simplification(name, what, f"{why} It cannot be applied here: {error}", 0.0, before)
+    return Simplification(name, what, why, 0.0, before, sizes_of(scene), scene)
+
+
+def _mirrored(shapes: Shapes) -> tuple[list[Simplification], list[str]]:
+    """One half after the other, across planes of symmetry that are normal to each other."""
+    mirrors, notes = find_mirrors(shapes)
+    mirrors, R, told = _orthogonal(shapes, mirrors)
+    notes += told
+    if not mirrors:
+        return [], notes
+    components = shapes.scene.components
+    normals = [R @ mirror.plane.normal for mirror in mirrors]
+    places = [mirror.plane.offset for mirror in mirrors]
+    if np.any(np.eye(len(R)) != R):
+        seen = shapes_of(turned(shapes.scene, R))
+        assert seen is not None
+        shapes = seen
+    found: list[Simplification] = []
+    for mirror, normal, place in zip(mirrors, normals, places):
+        plane = Plane(np.round(normal, 12), place)
+        again = images_under(shapes, plane)
+        if not isinstance(again, Images):
+            continue
+        before = sizes_of(shapes.scene)
+        made = half_of(shapes, plane, again)
+        copies = 2 ** (len(found) + 1)
+        what = f"The {PARTS[copies]} on one side of the plane {mirror.plane.words(components)} stands for the whole."
+        if np.any(np.eye(len(R)) != R):
+            what = f"{what[:-1]}, turned so that the plane is {plane.words(components)}."
+        after = sizes_of(made)
+        found.append(
+            Simplification("mirror symmetry", what, _why_mirror(shapes, plane, again), 0.0, before, after, made)
+        )
+        seen = shapes_of(made)
+        assert seen is not None
+        shapes = seen
+    return found, notes
+
+
+def _why_mirror(shapes: Shapes, plane: Plane, images: Images) -> str:
+    """Why one half is enough, how well the boundaries fit, and what the numbers of the half stand for."""
+    own = [name for name, image in images.bodies.items() if name in shapes.meshes and name == image]
+    text = "Bodies, supports, loads and laws are their own mirror images"
+    worst = images.apart / shapes.size
+    text += f", to {worst:.0e} of the size." if worst > 1e-9 else "."
+    text += f" {UNIQUE}"
+    side = side_of(plane)
+    if any(crosses(shapes.meshes[name], side) for name in own):
+        text += " The mesh is clipped at the plane, so that answers differ by the error of the mesh."
+    elif not all(is_mirrored(shapes.meshes[name], shapes.meshes[images.bodies[name]], plane) for name in shapes.meshes):
+        text += " The mesh is not symmetric, so that answers differ by the error of the mesh."
+    text += " Forces and areas stay those of the whole"
+    pairs = sorted({min(name, image) for name, image in images.pairs.items() if name != image})
+    text += "; a contact that stands for itself and its image carries the forces of both." if pairs else "."
+    return text
+
+
+def _orthogonal(shapes: Shapes, mirrors: list[Mirror]) -> tuple[list[Mirror], np.ndarray, list[str]]:
+    """As many mirrors as are normal to each other and can be seen from common axes, and the rotation to these axes."""
+    dim = shapes.scene.dim
+    best: tuple[list[Mirror], np.ndarray] = ([], np.eye(dim))
+    told: list[str] = []
+    for first in mirrors:
+        group = [first]
+        for other in mirrors:
+            if all(abs(other.plane.normal @ one.plane.normal) < 1e-6 for one in group):
+                group.append(other)
+        if len(group) <= len(best[0]):
+            continue
+        R = _rotation_to_axes([mirror.plane.normal for mirror in group], dim)
+        try:
+            turned(shapes.scene, R)
+        except InputError as error:
+            where = first.plane.words(shapes.scene.components)
+            told.append(
+                f"The scene is symmetric across the plane {where}, but cannot be turned so that the plane is "
+                f"normal to an axis: {error}"
+            )
+            continue
+        best = (group, R)
+    return *best, told if not best[0] else []
+
+
+def _rotation_to_axes(normals: list[np.ndarray], dim: int) -> np.ndarray:
+    """A rotation after which every normal lies along an axis; the identity if they do already."""
+    rows: list[np.ndarray | None] = [None] * dim
+    for normal in normals:
+        free = [axis for axis in range(dim) if rows[axis] is None]
+        axis = max(free, key=lambda number: abs(normal[number]))
+        rows[axis] = normal * np.sign(normal[axis] or 1.0)
+    for axis in range(dim):
+        if rows[axis] is None:
+            row = np.eye(dim)[axis]
+            for other in (known for known in rows if known is not None):
+                row = row - (row @ other) * other
+            if np.linalg.norm(row) < 0.1:
+                row = np.linalg.svd(np.array([known for known in rows if known is not None]))[2][-1]
+            rows[axis] = row / np.linalg.norm(row)
+    R = np.array(rows)
+    if np.abs(np.abs(R) - np.round(np.abs(R))).max() < 1e-12 and np.allclose(np.abs(R), np.eye(dim), atol=1e-12):
+        return np.eye(dim)
+    if np.linalg.det(R) < 0:
+        R[-1] = -R[-1]
+    return R
+
+
+def _solved(scene: Scene) -> tuple[list[Simplification], list[str]]:
+    """What one solve on a coarse mesh shows."""
+    solved = joints.coarse(scene)
+    if not solved.solution.solved:
+        return [], [
+            f"The scene was not solved on a coarse mesh ({solved.solution.message}); contacts were not looked at."
+        ]
+    before = sizes_of(scene)
+    found = [*_joints(scene, solved, before)]
+    spot = large_bodies.spot_of(solved)
+    if isinstance(spot, str):
+        return found, [f"Half-spaces are no model of this scene: {spot}."] if len(scene.pairs) == 1 else []
+    if spot.error > WORST:
+        size = f"{spot.size / spot.half_width:.3g} half-widths"
+        return found, [
+            f"Half-spaces would make an error of about {spot.error:.0%} in the peak pressure: the bodies end {size} from the contact."
+        ]
+    made = large_bodies.as_half_spaces(scene, spot)
+    why = (
+        f"The bodies end no nearer than {spot.size / spot.half_width:.3g} half-widths from the contact, and the gap rises by at most "
+        f"{spot.slope:.2g} per length inside it. The error is that of the peak pressure and the half-width; the approach is "
+        "another one, because it depends on the whole bodies."
+    )
+    what = "Half-spaces without a mesh stand for the bodies; their frame is the contact's own."
+    return [*found, Simplification("half-spaces", what, why, spot.error, before, sizes_of(made), made)], []
+
+
+def _joints(scene: Scene, solved: Solved, before: tuple[int, int]) -> list[Simplification]:
+    tied, smooth = joints.joints(solved)
+    if len(tied) == len(scene.pairs) == 1:
+        tied = ()
+    found = []
+    friction: dict[str, Any] = {pair.name: pair.mu for pair in scene.pairs}
+    for names, law, name in ((tied, "tied", "tied contacts"), (smooth, "frictionless", "frictionless contacts")):
+        if not names:
+            continue
+        made = joints.with_law(scene, names, law)
+        other = joints.coarse(made)
+        if not other.solution.solved:
+            continue
+        error = joints.change(solved, other)
+        listed = ", ".join(f"'{each}'" for each in names)
+        if law == "tied":
+            what = f"The {'contact' if len(names) == 1 else 'contacts'} {listed} can be tied."
+            why = "On a coarse mesh they stay closed and use no more than 80 % of their friction bound at any node."
+            check = joints.verdict_on_ties(names, friction)
+        else:
+            what = f"Friction can be left out at the {'contact' if len(names) == 1 else 'contacts'} {listed}."
+            why = "On a coarse mesh no tangential traction is more than a thousandth of the largest pressure."
+            check = joints.verdict_on_smooth(names)
+        why += " The error is the largest change of the energy and of the contact forces on that mesh."
+        found.append(Simplification(name, what, why, error, before, sizes_of(made), made, check))
+    return found
+
+
+def _place(point: np.ndarray) -> str:
+    return "(" + ", ".join(f"{0.0 if abs(value) < 1e-9 else value:.4g}" for value in point) + ")"
+
+
+def _direction(axis: np.ndarray, components: tuple[str, ...]) -> str:
+    """'z', or the direction by its components."""
+    number = int(np.argmax(np.abs(axis)))
+    return components[number] if abs(axis[number]) > 1 - 1e-9 else _place(axis)

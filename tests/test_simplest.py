@@ -1,0 +1,212 @@
+"""What may be left out of a scene: symmetries that are there are found, those that are not there are not."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import skfem
+from turned import turn, turn_about
+
+from contactopt import Material, Part, Plate, Rigid, Scene, Support, Traction, scenes, simplify
+from contactopt.analysis.quantities import approach, elastic_energy
+from contactopt.analysis.simplest.turning import turned
+from contactopt.analysis.solve_scene import Options, Solved, solve_scene
+from contactopt.scenes.meshes import rename, simplices, tensor_mesh
+
+SOFT, STIFF = Material(5.0, 0.3), Material(20.0, 0.2)
+TIGHT = Options(tol=1e-12)
+
+
+def punch(
+    dim: int = 2,
+    force: dict[str, float] | None = None,
+    mu: float | Callable = 0.3,
+    support: tuple[Support, ...] = (Support("bottom"),),
+    loads: tuple = (),
+    cells: int = 4,
+) -> Scene:
+    """A block pressed on a larger one, all of both; the middle is at x = 3 (and y = 1)."""
+    up, middle = "xyz"[dim - 1], np.array([3.0, 1.0])[: dim - 1]
+    force = {c: 0.0 for c in "xyz"[: dim - 1]} | {up: -10.0} if force is None else force
+
+    def box(half: tuple[float, ...], low: float, high: float, across: int, rows: int) -> skfem.Mesh:
+        ticks = [np.linspace(m - h, m + h, across + 1) for m, h in zip(middle, half)]
+        return tensor_mesh(*ticks, np.linspace(low, high, rows + 1))
+
+    block = rename(box((2.0, 1.0), 0.0, 2.0, 2 * cells, cells), contact=f"{up}-", top=f"{up}+")
+    ground = rename(
+        box((4.0, 2.0), -3.0, 0.0, 4 * cells, cells), contact=f"{up}+", bottom=f"{up}-", left="x-", right="x+"
+    )
+    plate = Plate("top", force)
+    under = np.all(np.abs(_middles(ground, "contact")[: dim - 1] - middle[:, None]) < [[2.0], [1.0]][: dim - 1], axis=0)
+    ground = ground.with_boundaries({"contact": ground.boundaries["contact"][under]})
+    return Scene(
+        "punch",
+        Part("block", block, SOFT, (), (plate, *loads)),
+        Part("ground", ground, STIFF, support),
+        mu,
+        kind="plane-strain" if dim == 2 else "solid",
+    )
+
+
+def _middles(mesh: skfem.Mesh, boundary: str) -> np.ndarray:
+    return mesh.p[:, mesh.facets[:, mesh.boundaries[boundary]]].mean(axis=1)
+
+
+def numbers(solved: Solved) -> np.ndarray:
+    """Energy, approach, total force, largest pressure: of the whole, whatever part is modelled."""
+    problem, r = solved.reduction.problem, solved.solution.reactions
+    own = approach(problem, solved.solution)
+    energy = elastic_energy(solved.reduction, solved.solution)
+    return np.array([energy, own or 0.0, r[:, 0].sum(), (r[:, 0] / problem.areas).max()])
+
+
+def halves(scene: Scene) -> list:
+    return [each for each in simplify(scene, solve=False).found if each.name == "mirror symmetry"]
+
+
+def test_half_of_a_punch_has_the_answer_of_the_whole():
+    whole = punch()
+    found = simplify(whole, solve=False)
+    assert [each.name for each in found.found] == ["mirror symmetry"]
+    assert "x = 3" in found.found[0].what and found.scene.copies == 2
+    assert "needs no more than one half of the bodies" in str(found)
+    one, other = solve_scene(whole, options=TIGHT), solve_scene(found.scene, options=TIGHT)
+    assert np.allclose(numbers(one), numbers(other), rtol=1e-8)
+    left, right = (each.reduction.problem for each in (one, other))
+    pressure = {round(x, 9): p for x, p in zip(left.coordinates[0], one.solution.reactions[:, 0] / left.areas)}
+    for x, p in zip(right.coordinates[0], other.solution.reactions[:, 0] / right.areas):
+        assert p == pytest.approx(pressure[round(x, 9)], rel=1e-8)
+
+
+def test_quarter_of_a_solid():
+    whole = punch(3, cells=2)
+    found = halves(whole)
+    assert [each.scene.copies for each in found] == [2, 4]
+    one, other = solve_scene(whole, options=TIGHT), solve_scene(found[-1].scene, options=TIGHT)
+    assert np.allclose(numbers(one), numbers(other), rtol=1e-8)
+    assert other.reduction.dofs < one.reduction.dofs / 3
+
+
+@pytest.mark.parametrize(
+    "scene, reason",
+    [
+        (punch(force={"x": 1.0, "y": -10.0}), "the plate on 'top'"),
+        (punch(support=(Support("bottom"), Support("left", {"x": 0.0}))), "the support on 'left'"),
+        (punch(loads=(Traction("x+", (0.0, 0.1)),)), "the traction on 'x+'"),
+        (punch(mu=lambda x: 0.3 + 0.1 * (x[0] > 3)), "the friction of contact"),
+    ],
+    ids=["plate", "support", "traction", "friction"],
+)
+def test_what_spoils_a_symmetry_is_named(scene, reason):
+    found = simplify(scene, solve=False)
+    assert not found.found and found.scene is scene
+    assert any(reason in note for note in found.notes), found.notes
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        punch(support=(Support("bottom", {"y": 0.0}), Support("left", {"x": 0.1}), Support("right", {"x": -0.1}))),
+        punch(loads=(Traction("x+", (0.1, 0.2)), Traction("x-", (-0.1, 0.2)))),
+        punch(mu=lambda x: 0.3 + 0.1 * np.abs(x[0] - 3)),
+    ],
+    ids=["support", "traction", "friction"],
+)
+def test_pairs_of_images_keep_a_symmetry(scene):
+    (half,) = halves(scene)
+    one, other = solve_scene(scene, options=TIGHT), solve_scene(half.scene, options=TIGHT)
+    assert np.allclose(numbers(one), numbers(other), rtol=1e-8)
+
+
+def test_gaps_are_compared():
+    block = punch().upper
+    for gap, count in ((lambda x: 0.01 * (x[0] - 3) ** 2, 1), (lambda x: 0.01 * (x[0] - 2.9) ** 2, 0)):
+        assert len(halves(Scene("ball", block, Rigid("floor", (0.0, 1.0), gap), 0.2))) == count
+
+
+def test_a_body_that_is_not_symmetric_is_told_from_one_that_is():
+    scene = punch()
+    skewed = replace(scene.lower.mesh, doflocs=scene.lower.mesh.p + 1e-3 * (scene.lower.mesh.p[0] > 6.99))
+    assert not halves(replace(scene, lower=replace(scene.lower, mesh=skewed)))
+
+
+def test_turned_by_thirty_degrees():
+    whole = turned(punch(), turn(30.0))
+    found = simplify(whole, solve=False)
+    assert "turned so that the plane is x" in found.found[0].what
+    one, other = solve_scene(whole, options=TIGHT), solve_scene(found.scene, options=TIGHT)
+    assert np.allclose(numbers(one), numbers(other), rtol=1e-8)
+
+
+def test_a_turned_solid_is_a_quarter():
+    whole = turned(punch(3, cells=2), turn_about((1.0, 2.0, 0.5), 40.0))
+    found = halves(whole)
+    assert len(found) == 2
+    one, other = solve_scene(whole, options=TIGHT), solve_scene(found[-1].scene, options=TIGHT)
+    assert np.allclose(numbers(one), numbers(other), rtol=1e-8)
+
+
+def test_a_support_that_cannot_be_turned_is_named():
+    scene = turned(punch(), turn(30.0))
+    slides = replace(
+        scene.lower, supports=(Support("left", {"x": 0.0}), Support("right", {"x": 0.0}), *scene.lower.supports)
+    )
+    assert not halves(replace(scene, lower=slides))
+
+
+def test_halves_of_meshes_of_any_kind():
+    """Triangles that cross the plane are clipped; the answer is that of a mesh of the same size."""
+    rng = np.random.default_rng(1)
+    scene = punch(cells=6)
+
+    def shaken(part: Part) -> Part:
+        mesh = simplices(part.mesh)
+        inner = np.setdiff1d(np.arange(mesh.p.shape[1]), np.unique(mesh.facets[:, mesh.boundary_facets()]))
+        p = mesh.p.copy()
+        p[:, inner] += 0.05 * rng.uniform(-1, 1, (2, len(inner)))
+        return replace(part, mesh=replace(mesh, doflocs=p))
+
+    whole = scene.with_parts(shaken)
+    (half,) = halves(whole)
+    assert "clipped" in half.why
+    for part in (half.scene.upper, half.scene.lower):
+        mesh = part.build_mesh(1, None)
+        assert mesh.p[0].min() == pytest.approx(3.0, abs=1e-12)
+        corners = mesh.p[:, mesh.t]
+        area = np.abs(np.linalg.det(np.moveaxis(corners[:, 1:] - corners[:, :1], 2, 0))).sum() / 2
+        assert area == pytest.approx({"block": 4.0, "ground": 12.0}[part.name], rel=1e-12)
+    assert np.allclose(numbers(solve_scene(whole)), numbers(solve_scene(half.scene)), rtol=0.05)
+
+
+def test_solids_are_clipped_without_gaps():
+    whole = punch(3, cells=3).with_parts(lambda part: replace(part, mesh=simplices(part.mesh)))
+    found = halves(whole)
+    assert len(found) == 2
+    for part, volume in ((found[-1].scene.upper, 4.0), (found[-1].scene.lower, 24.0)):
+        mesh = part.build_mesh(1, None)
+        corners = mesh.p[:, mesh.t]
+        assert np.abs(np.linalg.det(np.moveaxis(corners[:, 1:] - corners[:, :1], 2, 0))).sum() / 6 == pytest.approx(
+            volume, rel=1e-12
+        )
+        inner = skfem.MeshTet(mesh.p, mesh.t).boundary_facets()
+        assert len(mesh.boundaries["symmetry x"]) and np.isin(mesh.boundaries["symmetry x"], inner).all()
+
+
+def test_bodies_that_are_each_others_images():
+    arch = scenes.arch(elements=4)
+    (half,) = halves(arch)
+    assert (
+        len(half.scene.parts) == 5 and len(half.scene.pairs) == 4
+    )  # four stones, of which one is cut, and one abutment
+    one, other = solve_scene(arch, options=TIGHT), solve_scene(half.scene, options=TIGHT)
+    assert numbers(one)[0] == pytest.approx(numbers(other)[0], rel=1e-8)
+    forces = {pair.name: one.solution.reactions[pair.contacts, 0].sum() for pair in one.reduction.problem.pairs}
+    for pair in other.reduction.problem.pairs:
+        assert other.solution.reactions[pair.contacts, 0].sum() == pytest.approx(2 * forces[pair.name], rel=1e-8)
+
+
+def test_a_contact_in_the_plane_is_told():
+    found = simplify(scenes.arch(stones=6, elements=2), solve=False)
+    assert not found.found and any("lies in this plane itself" in note for note in found.notes)
