@@ -8,7 +8,7 @@ import pytest
 import skfem
 from turned import turn, turn_about
 
-from contactopt import Material, Part, Plate, Rigid, Scene, Support, Traction, scenes, simplify
+from contactopt import InputError, Material, Part, Plate, Rigid, Scene, Support, Traction, scenes, simplify
 from contactopt.analysis.quantities import approach, elastic_energy
 from contactopt.analysis.simplest.turning import turned
 from contactopt.analysis.solve_scene import Options, Solved, solve_scene
@@ -210,3 +210,166 @@ def test_bodies_that_are_each_others_images():
 def test_a_contact_in_the_plane_is_told():
     found = simplify(scenes.arch(stones=6, elements=2), solve=False)
     assert not found.found and any("lies in this plane itself" in note for note in found.notes)
+
+
+def prism(axis: int = 1, held: bool = True, push: float = 0.0) -> Scene:
+    """The plane punch as a solid: its section is across the axis, whose ends are held on rollers."""
+    plane = punch(force={"x": 1.0, "y": -10.0})
+    components = "xyz"
+    across = [components[other] for other in range(3) if other != axis]
+
+    def solid(part: Part) -> Part:
+        flat = part.mesh
+        depth = np.linspace(0.0, 1.5, 3)
+        mesh = skfem.MeshHex.init_tensor(*[np.unique(np.round(row, 12)) for row in flat.p], depth)
+        p = np.empty_like(mesh.p)
+        p[[other for other in range(3) if other != axis]], p[axis] = mesh.p[:2], mesh.p[2]
+        sides = {name: flat.p[:, flat.facets[:, facets]].mean(axis=1) for name, facets in flat.boundaries.items()}
+        made = replace(mesh, doflocs=p)
+        middle = made.p[:, made.facets].mean(axis=1)
+        section = np.delete(middle, axis, axis=0)
+
+        def on(points: np.ndarray) -> np.ndarray:
+            apart = np.abs(section[:, :, None] - points[:, None]).max(axis=0).min(axis=1)
+            return np.flatnonzero((apart < 1e-9) & (np.abs(middle[axis] % 0.75 - 0.375) < 1e-9))
+
+        ends = {end: np.flatnonzero(np.abs(middle[axis] - at) < 1e-9) for end, at in (("near", 0.0), ("far", 1.5))}
+        made = made.with_boundaries({name: on(points) for name, points in sides.items()} | ends)
+        rollers = tuple(Support(end, {components[axis]: 0.0}) for end in ends) if held else ()
+        loads = tuple(replace(load, force=dict(zip(across, load.force.values()))) for load in part.loads)
+        if push and loads:
+            loads = (*loads, Traction("x+", tuple(push * (other == axis) for other in range(3))))
+        supports = tuple(replace(each, displacement=None) for each in part.supports)
+        return replace(part, mesh=made, supports=(*supports, *rollers), loads=loads)
+
+    return replace(plane, kind="solid", upper=solid(plane.upper), lower=solid(plane.lower))
+
+
+def test_a_solid_that_is_a_plate_between_rollers_is_in_plane_strain():
+    solid, plane = prism(), punch(force={"x": 1.0, "y": -10.0})
+    found = simplify(solid, solve=False)
+    assert [each.name for each in found.found] == ["plane strain"] and found.scene.kind == "plane-strain"
+    whole, section = (solve_scene(scene, options=TIGHT) for scene in (solid, found.scene))
+    exact = solve_scene(replace(plane, thickness=1.5), options=TIGHT)
+    assert np.allclose(numbers(section), numbers(exact), rtol=1e-8)
+    assert np.allclose(numbers(whole), numbers(section), rtol=1e-8)
+
+
+def test_a_turned_plate_is_in_plane_strain():
+    solid = turned(prism(axis=2, held=False), turn_about((0.0, 0.0, 1.0), 20.0))
+    rollers = tuple(Support(end, {"z": 0.0}) for end in ("near", "far"))
+    solid = solid.with_parts(lambda part: replace(part, supports=(*part.supports, *rollers)))
+    found = simplify(solid, solve=False)
+    assert np.allclose(*(numbers(solve_scene(scene, options=TIGHT)) for scene in (solid, found.scene)), rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "scene, reason", [(prism(held=False), "the ends of body"), (prism(push=1.0), "along the axis")]
+)
+def test_a_prism_that_is_not_in_plane_strain(scene, reason):
+    found = simplify(scene, solve=False)
+    assert "plane strain" not in [each.name for each in found.found]
+    assert any(reason in note for note in found.notes), found.notes
+
+
+def pillar(shift: float = 0.0, sides: int = 16) -> Scene:
+    """A round pillar on a round floor, of hexahedra made by turning a section; `shift` moves the pillar off the axis."""
+
+    def turned_about(radius: float, low: float, high: float, top: str, bottom: str, move: float) -> skfem.Mesh:
+        angle = 2 * np.pi * np.arange(sides) / sides
+        rings = [np.zeros((2, 1)), *(r * np.stack([np.cos(angle), np.sin(angle)]) for r in (radius / 2, radius))]
+        flat = np.concatenate(rings, axis=1)
+        first, after = 1 + np.arange(sides), 1 + np.roll(np.arange(sides), -1)
+        inner = np.stack([np.zeros(sides, dtype=int), first, after])
+        outer = np.concatenate(
+            [np.stack([first, first + sides, after + sides]), np.stack([first, after + sides, after])], 1
+        )
+        cells = np.concatenate([inner, outer], axis=1)
+        heights, m = np.linspace(low, high, 4), flat.shape[1]
+        p = np.concatenate([np.concatenate([flat, np.full((1, m), z)]) for z in heights], axis=1)
+        tets = []
+        for layer in range(3):
+            a, b, c = np.sort(cells, axis=0) + layer * m
+            tets += [np.stack([a, b, c, c + m]), np.stack([a, b, b + m, c + m]), np.stack([a, a + m, b + m, c + m])]
+        mesh = skfem.MeshTet(p + np.array([[move], [0.0], [0.0]]), np.concatenate(tets, axis=1))
+        return mesh.with_boundaries({top: lambda x: np.isclose(x[2], high), bottom: lambda x: np.isclose(x[2], low)})
+
+    upper = Part(
+        "pillar", turned_about(1.0, 0.0, 2.0, "top", "contact", shift), SOFT, (), (Plate("top", {"z": -10.0}),)
+    )
+    lower = Part("floor", turned_about(2.0, -2.0, 0.0, "contact", "bottom", 0.0), STIFF, (Support("bottom"),))
+    return Scene("pillar", upper, lower, 0.3, kind="solid")
+
+
+def test_bodies_of_revolution_need_a_section_only():
+    found = simplify(pillar(), solve=False)
+    assert found.found[0].name == "axisymmetry" and found.scene.kind == "axisymmetric"
+    assert {c for part in found.scene.parts for c in part.build_mesh(1, None).boundaries} >= {
+        "top",
+        "axis of revolution",
+    }
+    solid, section = (numbers(solve_scene(scene)) for scene in (pillar(), found.scene))
+    assert section[2] == pytest.approx(10.0)
+    assert np.allclose(solid[:2], section[:2], rtol=0.1)  # the solid has a polygon for a circle, of 97 % of its area
+    assert not [each for each in simplify(pillar(0.05), solve=False).found if each.name == "axisymmetry"]
+
+
+def test_blocks_that_stick_are_tied_and_the_assumption_is_checked():
+    stack = scenes.stack(tilt=8.0, mu=0.3)
+    found = simplify(stack)
+    assert "tied contacts" in [each.name for each in found.found]
+    ties = found["tied contacts"]
+    assert ties.scene is not None and ties.check is not None and ties.after[1] < ties.before[1]
+    one, other = (solve_scene(scene, options=TIGHT) for scene in (stack, ties.scene))
+    assert np.allclose(numbers(one), numbers(other), rtol=1e-6)
+    assert "as was assumed" in ties.check(other)
+    slippery = simplify(scenes.stack(tilt=8.0, mu=0.16)).found
+    assert not [each for each in slippery if each.name == "tied contacts"]
+
+
+def test_ties_that_would_slip_are_told():
+    steep = scenes.stack(tilt=8.0, mu=0.3)
+    ties = simplify(steep)["tied contacts"]
+    tilted = scenes.stack(tilt=20.0, mu=0.6)
+    loads = {part.name: part.loads for part in tilted.parts if isinstance(part, Part)}
+    other = ties.scene.with_parts(
+        lambda part: replace(part, loads=loads[part.name]) if isinstance(part, Part) else part
+    )
+    other = replace(
+        other, contacts=tuple(replace(pair, mu=0.6) if pair.law == "coulomb" else pair for pair in other.contacts)
+    )
+    assert "would slip" in ties.check(solve_scene(other))
+
+
+def test_friction_that_does_nothing_is_left_out():
+    found = simplify(scenes.cylinder(mu=0.4))  # two bodies of one material hardly feel friction
+    assert "frictionless contacts" in [each.name for each in found.found]
+    assert found["frictionless contacts"].error < 1e-2
+    assert "slide by at most" in found["frictionless contacts"].check(solve_scene(found["frictionless contacts"].scene))
+    different = simplify(scenes.cylinder(mu=0.4, rigid="cylinder"))
+    assert "frictionless contacts" not in [each.name for each in different.found]
+
+
+def test_half_spaces_instead_of_large_bodies():
+    scene = scenes.cylinder(mu=0.0, elements=24)
+    found = simplify(scene)["half-spaces"]
+    exact = scene.reference.peak
+    pressure = numbers(solve_scene(found.scene))[3]
+    assert abs(pressure / exact - 1) < found.error + 2e-3
+    assert found.after[0] < found.before[0]
+
+
+def test_thin_bodies_are_no_half_spaces():
+    found = simplify(scenes.cylinder(mu=0.0, foundation_height=7.0, elements=24))
+    assert "half-spaces" not in [each.name for each in found.found]
+    assert any("half-widths from the contact" in note for note in found.notes), found.notes
+
+
+def test_a_report_reads_well_and_names_are_known():
+    found = simplify(punch())
+    assert "mirror symmetry" in repr(found) and "<table>" in found._repr_html_() and str(found).count("\n") > 3
+    with pytest.raises(InputError, match="no simplification 'plane strain'; found were: mirror symmetry"):
+        found["plane strain"]
+    with pytest.raises(InputError, match="must be a Scene"):
+        simplify("punch-2d")
+    assert not simplify(scenes.hertz_half_space()).found

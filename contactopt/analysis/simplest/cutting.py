@@ -205,7 +205,7 @@ def _clipped(mesh: Any, side: Side, curve_of: Callable[[str], Any]) -> Any:
     for row in (row for row in rows if _spread(row, marks)):
         whole += _divided(row, places, marks, middle)
     kind = skfem.MeshTri if len(points) == 2 else skfem.MeshTet
-    made = kind(np.array(places).T, np.array(whole).T)
+    made = kind(np.ascontiguousarray(np.array(places).T), np.ascontiguousarray(np.array(whole).T))
     new = named_like(replace(old, doflocs=points), made)
     return _on_curves(new, len(cells) and points.shape[1], side, curve_of)
 

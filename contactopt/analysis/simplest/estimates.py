@@ -9,4 +9,4 @@ REACH = 1.5  # half side of their points over the contact half-width
 
 # Bonded and frictionless pairs (contactopt.analysis.simplest.joints).
 SHARE = 0.8  # of its friction bound that no contact of a pair may use for the pair to be tied
-SMOOTH = 1e-3  # largest tangential traction over the largest pressure below which friction is left out
+SMOOTH = 1e-2  # largest tangential traction over the largest pressure below which friction is left out

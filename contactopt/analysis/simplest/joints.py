@@ -1,7 +1,7 @@
 """Pairs of surfaces that loads neither open nor make slip, and pairs whose friction hardly acts.
 
-One solve on a coarse mesh tells them apart. What leaving them out changes is measured on the same mesh: the elastic energy and
-the contact forces of all pairs. Whether the assumption holds in the end is read from the solution of the simplified scene,
+One solve on a coarse mesh tells them apart. What leaving them out changes is measured on the same mesh: the elastic energy, and
+the contact forces and largest pressures of all pairs. Whether the assumption holds in the end is read from the solution of the simplified scene,
 because the forces of a tied pair say whether it would have opened or slipped.
 """
 
@@ -73,15 +73,31 @@ def with_law(scene: Scene, names: tuple[str, ...], law: str) -> Scene:
 
 
 def change(one: Solved, other: Solved) -> float:
-    """The largest relative change of the elastic energy, and of the contact force of a pair over the largest one."""
-    energies = [elastic_energy(each.reduction, each.solution) for each in (one, other)]
-    forces = [
-        np.array([each.solution.reactions[pair.contacts].sum(axis=0) for pair in each.reduction.problem.pairs])
-        for each in (one, other)
-    ]
-    scale = float(np.linalg.norm(forces[0], axis=1).max(initial=0.0))
-    by_force = float(np.linalg.norm(forces[0] - forces[1], axis=1).max(initial=0.0)) / max(scale, 1e-300)
-    return max(by_force, abs(energies[1] - energies[0]) / max(abs(energies[0]), 1e-300))
+    """The largest relative change of the elastic energy, of the contact forces and of the largest pressure of each pair.
+
+    Forces and pressures are compared with the largest ones of the scene.
+    """
+    changes = []
+    for read in (_energy, _forces, _pressures):
+        a, b = read(one), read(other)
+        scale = float(np.linalg.norm(a, axis=-1).max(initial=0.0))
+        changes.append(float(np.linalg.norm(a - b, axis=-1).max(initial=0.0)) / max(scale, 1e-300))
+    return max(changes)
+
+
+def _energy(solved: Solved) -> np.ndarray:
+    return np.array([[elastic_energy(solved.reduction, solved.solution)]])
+
+
+def _forces(solved: Solved) -> np.ndarray:
+    """(pairs, dim) in the frames of the contacts."""
+    return np.array([solved.solution.reactions[pair.contacts].sum(axis=0) for pair in solved.reduction.problem.pairs])
+
+
+def _pressures(solved: Solved) -> np.ndarray:
+    """(pairs, 1)."""
+    pressure = solved.solution.reactions[:, 0] / np.maximum(solved.reduction.problem.areas, 1e-300)
+    return np.array([[pressure[pair.contacts].max(initial=0.0)] for pair in solved.reduction.problem.pairs])
 
 
 def verdict_on_ties(names: tuple[str, ...], friction: dict[str, object]) -> Callable[[Solved], str]:

@@ -21,9 +21,9 @@ from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 
 FLAT = 0.95  # cosine between the contact normals inside the contact and their mean, at least
 RINGS = 2.0  # contact half-widths about the middle whose gaps the polynomial follows
-FEWEST = 8  # contacts inside the contact for its shape to be known
+FEWEST = 4  # contacts inside the contact for its shape to be known
 ROUGH = 0.02  # of the indentation: how well the polynomial must follow the gap
-MIDDLE = 0.05  # of the half-width: how far from the middle the pressure may lie to one side
+AROUND = 0.5  # cosine to the normal of the contact from which on a side belongs to the surface about it
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +78,7 @@ def _spot(solved: Solved, touching: np.ndarray, mean: np.ndarray) -> Spot | str:
     places, number = problem.chart.images()
     weight = r[number, 0] / np.maximum(problem.areas[number], 1e-300)
     share = problem.areas[number] * weight
-    round_about = reduction.scene.kind == "axisymmetric"
-    middle = np.zeros(len(places)) if round_about else places @ share / share.sum()
+    middle = places @ share / share.sum()
     distance = np.linalg.norm(places - middle[:, None], axis=0)
     half_width = float(distance[touching[number]].max())
     if not 0 < half_width < 0.95 * distance.max():
@@ -90,7 +89,7 @@ def _spot(solved: Solved, touching: np.ndarray, mean: np.ndarray) -> Spot | str:
     gap, slope, misfit = fitted
     size = _size(solved, touching, half_width)
     force = float(r[:, 0].sum())
-    shear = 0.0 if round_about or reduction.scene.copies > 1 else float(r[:, 1].sum())
+    shear = 0.0 if reduction.scene.copies > 1 else float(r[:, 1].sum())
     return Spot(half_width, force, shear, gap, size, slope, misfit)
 
 
@@ -118,7 +117,7 @@ def _gap(
 
 
 def _size(solved: Solved, touching: np.ndarray, a: float) -> float:
-    """Distance from the contact to the nearest boundary of an elastic body that is not next to it [length]."""
+    """Distance from the contact to the nearest side of an elastic body that does not go on from its surface [length]."""
     reduction = solved.reduction
     points = reduction.problem.coordinates[:, touching]
     least = np.inf
@@ -129,12 +128,10 @@ def _size(solved: Solved, touching: np.ndarray, a: float) -> float:
         surface = np.concatenate([mesh.boundaries[name] for name in scene.surfaces_of(part)])
         facets = np.setdiff1d(mesh.boundary_facets(), surface)
         middles = mesh.p[:, mesh.facets[:, facets]].mean(axis=1)
-        inner = np.zeros(middles.shape[1], dtype=bool)
+        around = np.sum(outward(mesh, facets) * outward(mesh, surface).mean(axis=1)[:, None], axis=0) > AROUND
         for plane in planes:
-            inner |= plane.contains(middles, float(np.ptp(mesh.p, axis=1).max()))
-        if scene.kind == "axisymmetric":
-            inner |= np.abs(middles[0]) < 1e-9 * np.ptp(mesh.p[0])
-        middles = middles[:, ~inner]
+            around |= plane.contains(middles, float(np.ptp(mesh.p, axis=1).max()))
+        middles = middles[:, ~around]
         if middles.size:
             centre = points.mean(axis=1, keepdims=True)
             least = min(least, float(np.linalg.norm(middles - centre, axis=0).min()))
@@ -143,6 +140,16 @@ def _size(solved: Solved, touching: np.ndarray, a: float) -> float:
 
 def _part(scene: Scene, name: str) -> Any:
     return next(part for part in scene.parts if part.name == name)
+
+
+def outward(mesh: Any, facets: np.ndarray) -> np.ndarray:
+    """Outward unit normals (dim, m) of boundary facets."""
+    corners = mesh.p[:, mesh.facets[:, facets]]
+    edges = corners[:, 1:] - corners[:, :1]
+    across = np.stack([edges[1, 0], -edges[0, 0]]) if len(corners) == 2 else np.cross(edges[:, 0], edges[:, 1], axis=0)
+    inside = mesh.p[:, mesh.t[:, mesh.f2t[0, facets]]].mean(axis=1)
+    sense = np.sign(np.sum(across * (corners.mean(axis=1) - inside), axis=0))
+    return np.asarray(across * sense / np.linalg.norm(across, axis=0))
 
 
 def as_half_spaces(scene: Scene, spot: Spot) -> Scene:

@@ -157,7 +157,10 @@ def _equal_planes(one: Plane, other: Plane, size: float) -> bool:
 
 
 def images_under(shapes: Shapes, plane: Plane | Turn) -> Images | str | None:
-    """How the scene lies on itself; half a sentence if the bodies do and the rest does not; None if the bodies do not."""
+    """How the scene lies on itself.
+
+    Half a sentence if the bodies and the surfaces that may touch lie on themselves and the rest does not; None if they do not.
+    """
     images: dict[str, str] = {}
     apart = 0.0
     for name in shapes.meshes:
@@ -165,7 +168,7 @@ def images_under(shapes: Shapes, plane: Plane | Turn) -> Images | str | None:
         if found is None:
             return None
         images[name], apart = found[0], max(apart, found[1])
-    if any(images[image] != name for name, image in images.items()):
+    if any(images[image] != name for name, image in images.items()) or not _surfaces_fit(shapes, images, plane):
         return None
     own: set[tuple[str, int]] = set()
     for name, image in images.items():
@@ -180,6 +183,18 @@ def images_under(shapes: Shapes, plane: Plane | Turn) -> Images | str | None:
         return rigid
     pairs = _images_of_pairs(shapes, images | rigid, plane)
     return pairs if isinstance(pairs, str) else Images(images | rigid, pairs, frozenset(own), apart)
+
+
+def _surfaces_fit(shapes: Shapes, images: Mapping[str, str], plane: Plane | Turn) -> bool:
+    """Whether every contact surface of every body has a contact surface as its image."""
+    return all(
+        any(
+            _mirrored(shapes, name, surface, image, other, plane)
+            for other in shapes.scene.surfaces_of(shapes.parts[image])
+        )
+        for name, image in images.items()
+        for surface in shapes.scene.surfaces_of(shapes.parts[name])
+    )
 
 
 def _parts_differ(shapes: Shapes, name: str, image: str, plane: Plane | Turn) -> str:
@@ -273,8 +288,6 @@ def _curves_differ(shapes: Shapes, name: str, image: str, plane: Plane | Turn) -
             for other in shapes.scene.surfaces_of(two)
             if _mirrored(shapes, name, boundary, image, other, plane)
         ]
-        if not partners:
-            return f"the contact surface {boundary!r} of body '{name}' has no mirror image"
         if curve is None and partners[0] is None:
             continue
         x, other = _few(shapes, name, boundary), partners[0]

@@ -10,7 +10,7 @@ import numpy as np
 
 from contactopt.analysis.simplest import joints, large_bodies
 from contactopt.analysis.simplest.cutting import crosses, half_of, is_mirrored, side_of
-from contactopt.analysis.simplest.estimates import WORST
+from contactopt.analysis.simplest.estimates import SHARE, WORST
 from contactopt.analysis.simplest.mirrors import Images, Mirror, Plane, find_mirrors, images_under
 from contactopt.analysis.simplest.sections import axisymmetric, plane_strain, prism, revolution
 from contactopt.analysis.simplest.shapes import Shapes, shapes_of, sizes_of
@@ -21,6 +21,7 @@ from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 
 PARTS = {2: "half", 4: "quarter", 8: "eighth"}
+ROUNDING = 1e-10  # a smaller change between two solutions is rounding
 UNIQUE = "Exact wherever the solution is unique."
 
 
@@ -31,8 +32,9 @@ class Simplification:
     name      'plane strain', 'axisymmetry', 'mirror symmetry', 'half-spaces', 'tied contacts' or 'frictionless contacts'
     what      one sentence that says what is left out
     why       one or two sentences that say why, and how the error is known
-    error     relative error that it makes: 0.0 where it is exact, None where it is not known
-    before, after   (unknowns, contacts) of the scene that it is applied to, and of the simplified one, counted from their meshes
+    exact     whether the smaller scene has the answer of the whole one; only what the meshes differ in remains then
+    error     relative error that it makes, None where it is not known: where the mesh is cut, or has to be made anew
+    before, after   (unknowns, contacts that are not tied) of the scene that it is applied to, and of the simplified one, counted from their meshes
     scene     the simplified scene; None where the mesh has to be made anew by hand
     check     function of the solved simplified scene that says in a sentence whether what was assumed holds; None where
               nothing was assumed
@@ -41,6 +43,7 @@ class Simplification:
     name: str
     what: str
     why: str
+    exact: bool
     error: float | None
     before: tuple[int, int]
     after: tuple[int, int] | None = None
@@ -48,16 +51,14 @@ class Simplification:
     check: Callable[[Solved], str] | None = field(default=None, repr=False)
 
     @property
-    def exact(self) -> bool:
-        """Whether it makes no error."""
-        return self.error == 0.0
-
-    @property
     def price(self) -> str:
         """What it leaves, and what the error is, in words."""
-        error = (
-            "no error" if self.exact else "error not known" if self.error is None else f"error about {self.error:.1e}"
-        )
+        if self.exact:
+            error = "no error" if self.error == 0 else "no error but that of the mesh"
+        elif self.error is None:
+            error = "error not known"
+        else:
+            error = f"error about {self.error:.1e}" if self.error > ROUNDING else "no error on the coarse mesh"
         if self.after is None:
             return error
         (n, k), (m, c) = self.before, self.after
@@ -219,8 +220,8 @@ def _tried(name: str, what: str, why: str, before: tuple[int, int], make: Callab
     try:
         scene = make()
     except InputError as error:
-        return Simplification(name, what, f"{why} It cannot be applied here: {error}", 0.0, before)
-    return Simplification(name, what, why, 0.0, before, sizes_of(scene), scene)
+        return Simplification(name, what, f"{why} It cannot be applied here: {error}", True, None, before)
+    return Simplification(name, what, why, True, None, before, sizes_of(scene), scene)
 
 
 def _mirrored(shapes: Shapes) -> tuple[list[Simplification], list[str]]:
@@ -250,31 +251,32 @@ def _mirrored(shapes: Shapes) -> tuple[list[Simplification], list[str]]:
         if np.any(np.eye(len(R)) != R):
             what = f"{what[:-1]}, turned so that the plane is {plane.words(components)}."
         after = sizes_of(made)
-        found.append(
-            Simplification("mirror symmetry", what, _why_mirror(shapes, plane, again), 0.0, before, after, made)
-        )
+        why, error = _why_mirror(shapes, plane, again)
+        found.append(Simplification("mirror symmetry", what, why, True, error, before, after, made))
         seen = shapes_of(made)
         assert seen is not None
         shapes = seen
     return found, notes
 
 
-def _why_mirror(shapes: Shapes, plane: Plane, images: Images) -> str:
-    """Why one half is enough, how well the boundaries fit, and what the numbers of the half stand for."""
+def _why_mirror(shapes: Shapes, plane: Plane, images: Images) -> tuple[str, float | None]:
+    """Why one half is enough, how well the boundaries fit, and what the numbers of the half stand for; the error on the mesh."""
     own = [name for name, image in images.bodies.items() if name in shapes.meshes and name == image]
     text = "Bodies, supports, loads and laws are their own mirror images"
-    worst = images.apart / shapes.size
+    worst, error = images.apart / shapes.size, None
     text += f", to {worst:.0e} of the size." if worst > 1e-9 else "."
     text += f" {UNIQUE}"
-    side = side_of(plane)
-    if any(crosses(shapes.meshes[name], side) for name in own):
-        text += " The mesh is clipped at the plane, so that answers differ by the error of the mesh."
-    elif not all(is_mirrored(shapes.meshes[name], shapes.meshes[images.bodies[name]], plane) for name in shapes.meshes):
-        text += " The mesh is not symmetric, so that answers differ by the error of the mesh."
+    if any(crosses(shapes.meshes[name], side_of(plane)) for name in own):
+        text += " The mesh is clipped at the plane."
+    elif all(is_mirrored(mesh, shapes.meshes[images.bodies[name]], plane) for name, mesh in shapes.meshes.items()):
+        error = 0.0
+    else:
+        text += " The mesh is not symmetric."
     text += " Forces and areas stay those of the whole"
-    pairs = sorted({min(name, image) for name, image in images.pairs.items() if name != image})
-    text += "; a contact that stands for itself and its image carries the forces of both." if pairs else "."
-    return text
+    doubled = any(name != image for name, image in images.pairs.items())
+    return text + (
+        "; a contact that stands for itself and its image carries the forces of both." if doubled else "."
+    ), error
 
 
 def _orthogonal(shapes: Shapes, mirrors: list[Mirror]) -> tuple[list[Mirror], np.ndarray, list[str]]:
@@ -335,6 +337,8 @@ def _solved(scene: Scene) -> tuple[list[Simplification], list[str]]:
         ]
     before = sizes_of(scene)
     found = [*_joints(scene, solved, before)]
+    if scene.kind == "axisymmetric":
+        return found, []  # a section costs less than the square of points of a half-space
     spot = large_bodies.spot_of(solved)
     if isinstance(spot, str):
         return found, [f"Half-spaces are no model of this scene: {spot}."] if len(scene.pairs) == 1 else []
@@ -350,7 +354,7 @@ def _solved(scene: Scene) -> tuple[list[Simplification], list[str]]:
         "another one, because it depends on the whole bodies."
     )
     what = "Half-spaces without a mesh stand for the bodies; their frame is the contact's own."
-    return [*found, Simplification("half-spaces", what, why, spot.error, before, sizes_of(made), made)], []
+    return [*found, Simplification("half-spaces", what, why, False, spot.error, before, sizes_of(made), made)], []
 
 
 def _joints(scene: Scene, solved: Solved, before: tuple[int, int]) -> list[Simplification]:
@@ -370,14 +374,14 @@ def _joints(scene: Scene, solved: Solved, before: tuple[int, int]) -> list[Simpl
         listed = ", ".join(f"'{each}'" for each in names)
         if law == "tied":
             what = f"The {'contact' if len(names) == 1 else 'contacts'} {listed} can be tied."
-            why = "On a coarse mesh they stay closed and use no more than 80 % of their friction bound at any node."
+            why = f"On a coarse mesh they stay closed and use no more than {SHARE:.0%} of their friction bound at any node."
             check = joints.verdict_on_ties(names, friction)
         else:
             what = f"Friction can be left out at the {'contact' if len(names) == 1 else 'contacts'} {listed}."
-            why = "On a coarse mesh no tangential traction is more than a thousandth of the largest pressure."
+            why = "On a coarse mesh no tangential traction is more than a hundredth of the largest pressure."
             check = joints.verdict_on_smooth(names)
-        why += " The error is the largest change of the energy and of the contact forces on that mesh."
-        found.append(Simplification(name, what, why, error, before, sizes_of(made), made, check))
+        why += " The error is the largest change of energy, contact forces and largest pressures on that mesh."
+        found.append(Simplification(name, what, why, False, error, before, sizes_of(made), made, check))
     return found
 
 

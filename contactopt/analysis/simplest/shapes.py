@@ -79,7 +79,7 @@ def shapes_of(scene: Scene) -> Shapes | None:
 
 
 def sizes_of(scene: Scene) -> tuple[int, int]:
-    """Displacement unknowns and contacts of a scene, counted from its meshes without assembling anything.
+    """Displacement unknowns and contacts of a scene that are not tied, counted from its meshes without assembling anything.
 
     Contacts are the nodes of the finer surface of each pair; supports and what faces nothing are not taken off.
     """
@@ -100,7 +100,7 @@ def sizes_of(scene: Scene) -> tuple[int, int]:
             nodes[part.name, "contact"] = int(np.prod(grid))
     usual = {part.name: getattr(part, "contact", "contact") for part in scene.parts}
     contacts = 0
-    for pair in scene.pairs:
+    for pair in (pair for pair in scene.pairs if pair.law != "tied"):
         contacts += max(nodes.get((body, name or usual[body]), 0) for body, name in zip(pair.bodies, pair.surfaces))
     return unknowns, contacts
 

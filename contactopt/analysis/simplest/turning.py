@@ -79,7 +79,7 @@ def _part(scene: Scene, part: Any, R: np.ndarray) -> Any:
     turned_curves = {name: _turned_curve(curve, R) for name, curve in curves.items() if curve is not None}
     return replace(
         part,
-        mesh=of_mesh(part.mesh, lambda mesh: replace(mesh, doflocs=R @ mesh.doflocs)),
+        mesh=of_mesh(part.mesh, lambda mesh: replace(mesh, doflocs=np.ascontiguousarray(R @ mesh.doflocs))),
         loads=tuple(load(old) for old in part.loads),
         supports=tuple(support(old) for old in part.supports),
         curve=turned_curves or None,
