@@ -8,7 +8,8 @@ import pytest
 import skfem
 from turned import turn, turn_about
 
-from contactopt import InputError, Material, Part, Plate, Rigid, Scene, Support, Traction, scenes, simplify
+import contactopt
+from contactopt import InputError, Material, Part, Plate, Rigid, Scene, Support, Traction, cli, scenes, simplify
 from contactopt.analysis.quantities import approach, elastic_energy
 from contactopt.analysis.simplest.turning import turned
 from contactopt.analysis.solve_scene import Options, Solved, solve_scene
@@ -342,9 +343,8 @@ def test_ties_that_would_slip_are_told():
 
 
 def test_friction_that_does_nothing_is_left_out():
-    found = simplify(scenes.cylinder(mu=0.4))  # two bodies of one material hardly feel friction
-    assert "frictionless contacts" in [each.name for each in found.found]
-    assert found["frictionless contacts"].error < 1e-2
+    found = simplify(scenes.press_fit(mu=0.4))
+    assert found["frictionless contacts"].error < 1e-6
     assert "slide by at most" in found["frictionless contacts"].check(solve_scene(found["frictionless contacts"].scene))
     different = simplify(scenes.cylinder(mu=0.4, rigid="cylinder"))
     assert "frictionless contacts" not in [each.name for each in different.found]
@@ -373,3 +373,17 @@ def test_a_report_reads_well_and_names_are_known():
     with pytest.raises(InputError, match="must be a Scene"):
         simplify("punch-2d")
     assert not simplify(scenes.hertz_half_space()).found
+
+
+def test_the_command_says_what_may_be_left_out_and_run_applies_it(tmp_path, capsys):
+    assert cli.main(["simplify", "arch", "--set", "elements=2"]) == 0
+    assert "needs no more than one half of the bodies" in capsys.readouterr().out
+    run = ["run", "arch", "--elements", "2", "--no-figures", "--simplest", "--out", str(tmp_path / "half")]
+    assert cli.main(run) == 0
+    told = capsys.readouterr()
+    assert "needs no more than one half" in told.err and "arch" in told.out
+
+
+def test_a_load_path_is_not_simplified():
+    with pytest.raises(InputError, match="load path"):
+        contactopt.run("cattaneo-2d", simplest=True)

@@ -19,6 +19,7 @@ EPILOG = """Examples:
   contactopt run punch-2d                      solve a scene, write numbers, figures and fields into out/punch-2d
   contactopt run punch-2d --set width=30       with another value of an argument of the scene
   contactopt show punch-2d                     what a scene is, its arguments, and what is known exactly
+  contactopt simplify arch                     what may be left out of a scene
   contactopt view out/punch-2d                 the result as a page to explore
 """
 
@@ -51,6 +52,12 @@ def make_parser() -> argparse.ArgumentParser:
     show = add("show", "say what a scene is: sketch, sizes, arguments, source, what is exact", commands.show)
     show.add_argument("scene", metavar="SCENE", help="a scene file (.toml), or " + ", ".join(SCENES))
     show.add_argument("--set", metavar="NAME=VALUE", action="append", default=[], help="an argument of the scene")
+    simple = add("simplify", "say what may be left out of a scene, why, and with which error", commands.simplify)
+    simple.add_argument("scene", metavar="SCENE", help="a scene file (.toml), or " + ", ".join(SCENES))
+    simple.add_argument("--set", metavar="NAME=VALUE", action="append", default=[], help="an argument of the scene")
+    simple.add_argument(
+        "--no-solve", action="store_true", help="look for exact simplifications only, which takes no solve"
+    )
     new = add("new", "write a scene file to start from, an example that runs", commands.new)
     new.add_argument("file", metavar="FILE", help="name of the file, ends in .toml; an existing one is not overwritten")
     _bench(add("bench", "execute the runs of an experiment file", commands.bench))
@@ -93,6 +100,11 @@ def _run(run: argparse.ArgumentParser) -> None:
         help="what --accuracy bounds: " + ", ".join(QUANTITIES) + "; of one pair NAME:PAIR",
     )
     run.add_argument("--adaptive", action="store_true", help="refine only where the quantity needs it")
+    run.add_argument(
+        "--simplest",
+        action="store_true",
+        help="leave out all that can be left out exactly, as contactopt simplify says",
+    )
     run.add_argument(
         "--ranks", type=int, metavar="N", help="processes among which the bodies are dealt out (needs mpi4py)"
     )
