@@ -387,3 +387,24 @@ def test_the_command_says_what_may_be_left_out_and_run_applies_it(tmp_path, caps
 def test_a_load_path_is_not_simplified():
     with pytest.raises(InputError, match="load path"):
         contactopt.run("cattaneo-2d", simplest=True)
+
+
+def test_rollers_at_a_contact_are_no_planes_of_symmetry():
+    """A whole block between rollers: after a cut in x its walls would be taken for mirrors, and resultants halved."""
+    scene = prism(held=False, axis=1)
+    walls = scene.with_parts(
+        lambda part: replace(part, supports=(*part.supports, Support("near", {"y": 0.0})), loads=part.loads)
+    )
+    straight = walls.with_parts(
+        lambda part: replace(part, loads=tuple(replace(load, force={"x": 0.0, "z": -10.0}) for load in part.loads))
+    )
+    found = simplify(straight, solve=False)
+    assert not found.found and any("is not cut" in note for note in found.notes)
+
+
+def test_shear_goes_along_to_half_spaces():
+    scene = scenes.cattaneo(2, elements=24)
+    found = simplify(scene)["half-spaces"]
+    whole, made = (solve_scene(each) for each in (scene, found.scene))
+    totals = [np.abs(each.solution.reactions.sum(axis=0)) for each in (whole, made)]
+    assert np.allclose(*totals, rtol=1e-3) and totals[0][1] > 0.1 * totals[0][0]

@@ -68,6 +68,25 @@ def side_of(plane: Plane) -> Side:
     return Side(axis, float(plane.offset * np.sign(plane.normal[axis])))
 
 
+def roller(shapes: Shapes) -> str:
+    """The name of a support that holds one component of contacts in a plane across it; empty if there is none.
+
+    In a scene of mirror images such a support is a plane of symmetry (contactopt.interface.charts), in a whole scene it is not.
+    """
+    for name, part in shapes.parts.items():
+        mesh = shapes.meshes[name]
+        contacts = np.unique(
+            np.concatenate([mesh.facets[:, mesh.boundaries[s]].ravel() for s in shapes.scene.surfaces_of(part)])
+        )
+        for support in part.supports:
+            nodes = np.unique(mesh.facets[:, mesh.boundaries[support.boundary]])
+            for component in support.displacement or {}:
+                row = mesh.p[shapes.scene.components.index(component), nodes]
+                if np.ptp(row) < NEAR * shapes.size and len(np.intersect1d(nodes, contacts)):
+                    return f"the support on {support.boundary!r} of body '{name}'"
+    return ""
+
+
 def _keeps(pair: Any, shapes: Shapes, images: Images, kept: set[str], side: Side) -> bool:
     """Whether a pair belongs to the half: those whose images are other pairs stay on one side only."""
     elastic = [name for name in pair.bodies if name in shapes.meshes]

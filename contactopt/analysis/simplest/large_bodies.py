@@ -23,6 +23,7 @@ FLAT = 0.95  # cosine between the contact normals inside the contact and their m
 RINGS = 2.0  # contact half-widths about the middle whose gaps the polynomial follows
 FEWEST = 4  # contacts inside the contact for its shape to be known
 ROUGH = 0.02  # of the indentation: how well the polynomial must follow the gap
+SMALL = 1e-6  # tangential force over the normal one that counts as none
 AROUND = 0.5  # cosine to the normal of the contact from which on a side belongs to the surface about it
 
 
@@ -30,7 +31,7 @@ AROUND = 0.5  # cosine to the normal of the contact from which on a side belongs
 class Spot:
     """The contact as a coarse solve shows it.
 
-    half_width  of the contact [length];   force  total normal force;  shear  total tangential force along the first tangent
+    half_width  of the contact [length];   force  total normal force;  shear  total tangential forces (dim - 1,) on the upper body, along the tangents
     gap         the initial gap as a function of the distance from the middle (in 2D the place along the line)
     size        distance from the contact to the nearest end of an elastic body [length]
     slope       of the gap at the edge of the contact [-];   misfit  of the gap over the indentation [-]
@@ -38,7 +39,7 @@ class Spot:
 
     half_width: float
     force: float
-    shear: float
+    shear: np.ndarray
     gap: Callable[[np.ndarray], np.ndarray]
     size: float
     slope: float
@@ -89,7 +90,7 @@ def _spot(solved: Solved, touching: np.ndarray, mean: np.ndarray) -> Spot | str:
     gap, slope, misfit = fitted
     size = _size(solved, touching, half_width)
     force = float(r[:, 0].sum())
-    shear = 0.0 if reduction.scene.copies > 1 else float(r[:, 1].sum())
+    shear = np.where(problem.chart.mirrored, 0.0, r[:, 1:].sum(axis=0))  # that of mirror images cancels
     return Spot(half_width, force, shear, gap, size, slope, misfit)
 
 
@@ -169,8 +170,8 @@ def as_half_spaces(scene: Scene, spot: Spot) -> Scene:
     pair = scene.pairs[0]
     upper, lower = (_part(scene, name) for name in pair.bodies)
     total = {components[dim - 1]: -spot.force}
-    if spot.shear:
-        total["x"] = spot.shear
+    if np.linalg.norm(spot.shear) > SMALL * spot.force:
+        total |= {name: -float(value) for name, value in zip(components, spot.shear)}
     top: Any = Rigid(upper.name, gap=gap, force=total)
     if isinstance(upper, Part):
         top = HalfSpace(upper.name, upper.material, points, height=lambda x: -gap(x), force=total)

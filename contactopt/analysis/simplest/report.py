@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.simplest import joints, large_bodies
-from contactopt.analysis.simplest.cutting import crosses, half_of, is_mirrored, side_of
+from contactopt.analysis.simplest.cutting import crosses, half_of, is_mirrored, roller, side_of
 from contactopt.analysis.simplest.estimates import SHARE, WORST
 from contactopt.analysis.simplest.mirrors import Images, Mirror, Plane, find_mirrors, images_under
 from contactopt.analysis.simplest.sections import axisymmetric, plane_strain, prism, revolution
@@ -227,6 +227,12 @@ def _tried(name: str, what: str, why: str, before: tuple[int, int], make: Callab
 def _mirrored(shapes: Shapes) -> tuple[list[Simplification], list[str]]:
     """One half after the other, across planes of symmetry that are normal to each other."""
     mirrors, notes = find_mirrors(shapes)
+    if mirrors and shapes.scene.copies == 1 and (name := roller(shapes)):
+        return [], [
+            *notes,
+            f"The scene is symmetric across the plane {mirrors[0].plane.words(shapes.scene.components)}, but is not cut: in a part of "
+            f"the bodies {name}, which holds a contact along one axis, would count as a plane of symmetry, too.",
+        ]
     mirrors, R, told = _orthogonal(shapes, mirrors)
     notes += told
     if not mirrors:
