@@ -25,6 +25,7 @@ from contactopt.bodies.local_refinement import named_like, simplices
 from contactopt.scenes.scene import Part, Plate, Rigid, Scene, Support
 
 NEAR = 1e-9  # nodes lie in the plane within this fraction of the body's size
+OFF = 1e-3  # of that edge: how far such a move may lead out of the boundary
 SNAP = 0.3  # nodes nearer to the plane than this fraction of a crossing edge move onto it
 
 
@@ -94,10 +95,15 @@ def _keeps(pair: Any, shapes: Shapes, images: Images, kept: set[str], side: Side
         return False
     if images.pairs[pair.name] == pair.name:
         return True
-    number = pair.bodies.index(elastic[0])
-    boundary = pair.surfaces[number] or shapes.parts[elastic[0]].contact
-    where = shapes.boundary(elastic[0], boundary)
-    return bool(side.height(where.corners.mean(axis=1)) @ where.areas > 0)
+    if any(images.bodies[name] != name for name in elastic):
+        return True  # the image is a pair of the body on the other side
+    heights = []
+    for name, surface in zip(pair.bodies, pair.surfaces):
+        if name in shapes.parts:
+            where = shapes.boundary(name, surface or shapes.parts[name].contact)
+            heights.append(float(side.height(where.corners.mean(axis=1)) @ where.areas / where.areas.sum()))
+    farthest = max(heights, key=abs)
+    return farthest > 0 if abs(farthest) > NEAR * shapes.size else bool(pair.name < images.pairs[pair.name])
 
 
 def _half_rigid(images: Images, part: Rigid, component: str) -> Rigid:
@@ -255,7 +261,7 @@ def _divided(
 
 
 def _snapped(mesh: Any, points: np.ndarray, side: Side) -> np.ndarray:
-    """The nodes with those near the plane moved onto it, unless that would move them out of a flat boundary."""
+    """The nodes with those near the plane moved onto it, unless that would move them out of the boundary."""
     height = side.height(points)
     edges = mesh.facets if len(points) == 2 else mesh.edges
     crossing = edges[:, height[edges[0]] * height[edges[1]] < 0]
@@ -265,8 +271,10 @@ def _snapped(mesh: Any, points: np.ndarray, side: Side) -> np.ndarray:
         np.minimum.at(nearest, end, length)
     moves = np.abs(height) < SNAP * np.where(np.isfinite(nearest), nearest, 0.0)
     facets = mesh.facets[:, mesh.boundary_facets()]
-    steep = facets[:, ~_along(points[:, facets], side.axis)]
-    moves[np.unique(steep)] = False
+    steep = np.zeros(points.shape[1])
+    for corner in facets:
+        np.maximum.at(steep, corner, _steepness(points[:, facets], side.axis))
+    moves &= steep * np.abs(height) <= OFF * np.where(np.isfinite(nearest), nearest, 0.0)
     moved = points.copy()
     moved[side.axis, moves] = side.place
     volumes = [np.linalg.det(np.moveaxis(x[:, mesh.t[1:]] - x[:, mesh.t[:1]], 2, 0)) for x in (points, moved)]
@@ -276,11 +284,12 @@ def _snapped(mesh: Any, points: np.ndarray, side: Side) -> np.ndarray:
     return moved
 
 
-def _along(corners: np.ndarray, axis: int) -> np.ndarray:
-    """(m,) whether facets with these corners (dim, dim, m) contain the direction of the axis, but for a slight curve."""
+def _steepness(corners: np.ndarray, axis: int) -> np.ndarray:
+    """(m,) by how much facets with these corners (dim, dim, m) turn away from the direction of the axis: 0 if they contain it."""
     edges = corners[:, 1:] - corners[:, :1]
     across = np.stack([edges[1, 0], -edges[0, 0]]) if len(corners) == 2 else np.cross(edges[:, 0], edges[:, 1], axis=0)
-    return np.asarray(np.abs(across[axis]) < 1e-9 * np.linalg.norm(across, axis=0))
+    sine = np.abs(across[axis]) / np.linalg.norm(across, axis=0)
+    return np.asarray(np.where(sine < 1e-9, 0.0, sine))
 
 
 def _on_curves(mesh: Any, first: int, side: Side, curve_of: Callable[[str], Any]) -> Any:

@@ -35,6 +35,11 @@ class Plane:
     offset: float
 
     @property
+    def key(self) -> bytes:
+        """What tells this plane from others."""
+        return bytes(self.normal.tobytes() + np.float64(self.offset).tobytes())
+
+    @property
     def reflection(self) -> np.ndarray:
         """H (dim, dim)."""
         return np.eye(len(self.normal)) - 2 * np.outer(self.normal, self.normal)
@@ -50,8 +55,9 @@ class Plane:
         terms = [(value, component) for value, component in zip(self.normal, components) if abs(value) > NEAR]
         if len(terms) == 1:
             return f"{terms[0][1]} = {_rounded(self.offset * np.sign(terms[0][0])):g}"
-        text = " + ".join(f"{value:.4g} {component}" for value, component in terms).replace("+ -", "- ")
-        return f"{text} = {_rounded(self.offset):.4g}"
+        sign = np.sign(terms[0][0])
+        text = " + ".join(f"{sign * value:.4g} {component}" for value, component in terms).replace("+ -", "- ")
+        return f"{text} = {_rounded(sign * self.offset):.4g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +66,11 @@ class Turn:
 
     reflection: np.ndarray
     point: np.ndarray
+
+    @property
+    def key(self) -> bytes:
+        """What tells this rotation from others."""
+        return bytes(self.reflection.tobytes() + self.point.tobytes())
 
     def image(self, points: np.ndarray) -> np.ndarray:
         """Points (dim, k) after the rotation."""
@@ -222,8 +233,11 @@ def _image_of_body(shapes: Shapes, name: str, plane: Plane | Turn) -> tuple[str,
 
 def _mirrored(shapes: Shapes, body: str, boundary: str, image: str, other: str, plane: Plane | Turn) -> bool:
     """Whether a boundary of a body has another boundary of its image as its mirror image."""
-    one, two = shapes.boundary(body, boundary), shapes.boundary(image, other)
-    return same(one, two, plane.image, plane.back, shapes.size) is not None
+    key = (plane.key, body, boundary, image, other)
+    if key not in shapes.fits:
+        one, two = shapes.boundary(body, boundary), shapes.boundary(image, other)
+        shapes.fits[key] = same(one, two, plane.image, plane.back, shapes.size) is not None
+    return shapes.fits[key]
 
 
 def held_space(components: tuple[str, ...], values: Mapping[str, float] | None) -> tuple[np.ndarray, np.ndarray]:

@@ -18,6 +18,7 @@ from scipy.spatial import KDTree
 NEAR = 1e-8  # what counts as zero beside the size of the scene
 CORNER = np.deg2rad(30)  # turn between neighbouring facets from which on the edge between them is a corner, not a curve
 ARC = 0.25  # height of an arc above its chord over length times turn: an eighth, and a margin for uneven facets
+MOST = 32  # points at which a slender facet is looked for
 CLOSEST = 6  # facets of each size among which the closest one is looked for
 INSIDE = {2: np.array([[0.5, 0.9, 0.1]]), 3: np.array([[1, 0.8, 0.1, 0.1], [1, 0.1, 0.8, 0.1]]) / [[3, 1, 1, 1]]}
 
@@ -57,11 +58,12 @@ class Region:
 
     @cached_property
     def _classes(self) -> list[tuple[KDTree, np.ndarray]]:
-        """The centres of the facets in classes of about equal size, with the numbers of the facets."""
-        size = np.linalg.norm(self.edges, axis=0).max(axis=0)
-        number = np.floor(np.log2(size / size.min())).astype(int)
-        centres = self.corners.mean(axis=1)
-        return [(KDTree(centres[:, own].T), own) for own in (np.flatnonzero(number == c) for c in np.unique(number))]
+        """Points on the facets, in classes of facets of about equal height, with the facet of each point."""
+        anchors, facet, height = _anchors(self.corners)
+        number = np.floor(np.log2(height / height.min())).astype(int)
+        return [
+            (KDTree(anchors[:, own].T), facet[own]) for own in (np.flatnonzero(number == c) for c in np.unique(number))
+        ]
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How far points (dim, s) are from the region (s,), and the closest facet of each (s,)."""
@@ -79,6 +81,28 @@ class Region:
         best = np.argmin(apart, axis=1)
         rows = np.arange(len(best))
         return apart[rows, best], facets[rows, best]
+
+
+def _anchors(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (dim, s) at half the height of each facet, as many along its longest side as it is slender; facet, height (s,).
+
+    The place of a slender facet is not known from its centre alone.
+    """
+    dim, m = len(corners), corners.shape[2]
+    if dim == 2:
+        return corners.mean(axis=1), np.arange(m), np.linalg.norm(corners[:, 1] - corners[:, 0], axis=0)
+    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=0)  # (3, m), from corner i to corner i + 1
+    first, every = np.argmax(sides, axis=0), np.arange(m)
+    P, Q, R = (corners[:, (first + turn) % 3, every] for turn in range(3))
+    long = Q - P
+    foot = np.sum(long * (R - P), axis=0) / np.sum(long**2, axis=0)
+    up = R - P - foot * long
+    height = np.linalg.norm(up, axis=0)
+    count = np.clip(np.ceil(sides[first, every] / height / 2), 1, MOST).astype(int)
+    facet = np.repeat(every, count)
+    t = (np.arange(len(facet)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[facet]
+    rise = np.minimum(t / np.maximum(foot[facet], 1e-12), (1 - t) / np.maximum(1 - foot[facet], 1e-12)).clip(0, 1) / 2
+    return P[:, facet] + t * long[:, facet] + rise * up[:, facet], facet, height[facet]
 
 
 def region(mesh: Any, facets: np.ndarray) -> Region:

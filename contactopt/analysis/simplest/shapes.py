@@ -35,6 +35,11 @@ class Shapes:
         return {name: region(mesh, mesh.boundary_facets()) for name, mesh in self.meshes.items()}
 
     @cached_property
+    def fits(self) -> dict[tuple[Any, ...], bool]:
+        """What is known of boundaries that fit each other."""
+        return {}
+
+    @cached_property
     def _named(self) -> dict[tuple[str, str], Region]:
         return {}
 
