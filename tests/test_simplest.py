@@ -350,8 +350,9 @@ def test_friction_that_does_nothing_is_left_out():
     assert "frictionless contacts" not in [each.name for each in different.found]
 
 
-def test_half_spaces_instead_of_large_bodies():
-    scene = scenes.cylinder(mu=0.0, elements=24)
+@pytest.mark.parametrize("rigid", [None, "cylinder", "foundation"])
+def test_half_spaces_instead_of_large_bodies(rigid):
+    scene = scenes.cylinder(mu=0.0, elements=24, rigid=rigid)
     found = simplify(scene)["half-spaces"]
     exact = scene.reference.peak
     pressure = numbers(solve_scene(found.scene))[3]

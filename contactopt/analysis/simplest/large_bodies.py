@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.simplest.estimates import ACROSS, FINITE, REACH, STEEP
+from contactopt.analysis.simplest.regions import region
 from contactopt.analysis.solve_scene import Solved
 from contactopt.analysis.status import contact_status
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
@@ -24,6 +25,7 @@ RINGS = 2.0  # contact half-widths about the middle whose gaps the polynomial fo
 FEWEST = 4  # contacts inside the contact for its shape to be known
 ROUGH = 0.02  # of the indentation: how well the polynomial must follow the gap
 SMALL = 1e-6  # tangential force over the normal one that counts as none
+ALL = 64  # sides of each size among which the nearest one is looked for
 AROUND = 0.5  # cosine to the normal of the contact from which on a side belongs to the surface about it
 
 
@@ -88,7 +90,7 @@ def _spot(solved: Solved, touching: np.ndarray, mean: np.ndarray) -> Spot | str:
     if isinstance(fitted, str):
         return fitted
     gap, slope, misfit = fitted
-    size = _size(solved, touching, half_width)
+    size = _size(solved, touching)
     force = float(r[:, 0].sum())
     shear = np.where(problem.chart.mirrored, 0.0, r[:, 1:].sum(axis=0))  # that of mirror images cancels
     return Spot(half_width, force, shear, gap, size, slope, misfit)
@@ -117,10 +119,10 @@ def _gap(
     return function, float(2 * c[1] + 4 * c[2]) / a, misfit
 
 
-def _size(solved: Solved, touching: np.ndarray, a: float) -> float:
+def _size(solved: Solved, touching: np.ndarray) -> float:
     """Distance from the contact to the nearest side of an elastic body that does not go on from its surface [length]."""
     reduction = solved.reduction
-    points = reduction.problem.coordinates[:, touching]
+    centre = reduction.problem.coordinates[:, touching].mean(axis=1, keepdims=True)
     least = np.inf
     planes = [plane for made in reduction.couplings for plane in made.planes]
     scene = reduction.scene
@@ -132,10 +134,9 @@ def _size(solved: Solved, touching: np.ndarray, a: float) -> float:
         around = np.sum(outward(mesh, facets) * outward(mesh, surface).mean(axis=1)[:, None], axis=0) > AROUND
         for plane in planes:
             around |= plane.contains(middles, float(np.ptp(mesh.p, axis=1).max()))
-        middles = middles[:, ~around]
-        if middles.size:
-            centre = points.mean(axis=1, keepdims=True)
-            least = min(least, float(np.linalg.norm(middles - centre, axis=0).min()))
+        if not around.all():
+            apart, _ = region(mesh, facets[~around]).distance(centre, ALL)
+            least = min(least, float(apart[0]))
     return float(least)
 
 
@@ -173,9 +174,12 @@ def as_half_spaces(scene: Scene, spot: Spot) -> Scene:
     if np.linalg.norm(spot.shear) > SMALL * spot.force:
         total |= {name: -float(value) for name, value in zip(components, spot.shear)}
     top: Any = Rigid(upper.name, gap=gap, force=total)
+    bottom: Any = Rigid(lower.name, gap=gap)
+    if isinstance(lower, Part):
+        bottom = HalfSpace(lower.name, lower.material, points)
     if isinstance(upper, Part):
-        top = HalfSpace(upper.name, upper.material, points, height=lambda x: -gap(x), force=total)
-    bottom: Any = Rigid(lower.name) if not isinstance(lower, Part) else HalfSpace(lower.name, lower.material, points)
+        height = (lambda x: -gap(x)) if isinstance(lower, Part) else None  # a rigid body has the gap itself
+        top = HalfSpace(upper.name, upper.material, points, height=height, force=total)
     return Scene(
         f"{scene.name} as half-spaces",
         top,

@@ -19,7 +19,7 @@ NEAR = 1e-8  # what counts as zero beside the size of the scene
 CORNER = np.deg2rad(30)  # turn between neighbouring facets from which on the edge between them is a corner, not a curve
 ARC = 0.25  # height of an arc above its chord over length times turn: an eighth, and a margin for uneven facets
 MOST = 32  # points at which a slender facet is looked for
-CLOSEST = 6  # facets of each size among which the closest one is looked for
+CLOSEST = 4, 48  # points of each size among which the closest facet is looked for, first and where that did not help
 INSIDE = {2: np.array([[0.5, 0.9, 0.1]]), 3: np.array([[1, 0.8, 0.1, 0.1], [1, 0.1, 0.8, 0.1]]) / [[3, 1, 1, 1]]}
 
 
@@ -65,11 +65,11 @@ class Region:
             (KDTree(anchors[:, own].T), facet[own]) for own in (np.flatnonzero(number == c) for c in np.unique(number))
         ]
 
-    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far points (dim, s) are from the region (s,), and the closest facet of each (s,)."""
+    def distance(self, points: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+        """How far points (dim, s) are from the region (s,), and the closest facet of each (s,), among `most` of each size."""
         near = []
         for tree, own in self._classes:
-            count = min(CLOSEST, len(own))
+            count = min(most, len(own))
             near.append(own[np.asarray(tree.query(points.T, k=count)[1]).reshape(-1, count)])
         facets = np.concatenate(near, axis=1)  # (s, candidates)
         edges, offset = self.edges[:, :, facets], points[:, :, None] - self.corners[:, 0][:, facets]
@@ -163,23 +163,32 @@ def same(one: Region, other: Region, move: Any, back: Any, size: float) -> float
     -------
     The largest distance of the sampled points [length], or None if one of them is farther away than it may be.
     """
-    worst = 0.0
-    for first, second, mapped in ((one, other, move), (other, one, back)):
-        for points, facet in _portions(first):
-            apart, there = second.distance(mapped(points))
-            if np.any(apart > NEAR * size + first.slack[facet] + second.slack[there]):
-                return None
-            worst = max(worst, float(apart.max(initial=0.0)))
-    return worst
+    there, back_again = _farthest(one, other, move, size), None
+    if there is not None:
+        back_again = _farthest(other, one, back, size)
+    return None if there is None or back_again is None else max(there, back_again)
 
 
 def inside(one: Region, other: Region, move: Any, size: float) -> bool:
     """Whether `move` puts all of the first region on the second."""
+    return _farthest(one, other, move, size) is not None
+
+
+def _farthest(one: Region, other: Region, move: Any, size: float) -> float | None:
+    """The largest distance of moved samples of a region from another one; None if one is farther away than it may be."""
+    worst = 0.0
     for points, facet in _portions(one):
-        apart, there = other.distance(move(points))
-        if np.any(apart > NEAR * size + one.slack[facet] + other.slack[there]):
-            return False
-    return True
+        moved, apart, beyond = move(points), np.zeros(len(facet)), np.ones(len(facet), dtype=bool)
+        for most in CLOSEST:
+            apart[beyond], there = other.distance(moved[:, beyond], most)
+            allowed = NEAR * size + one.slack[facet[beyond]] + other.slack[there]
+            beyond[beyond] = apart[beyond] > allowed
+            if not beyond.any():
+                break
+        if beyond.any():
+            return None
+        worst = max(worst, float(apart.max(initial=0.0)))
+    return worst
 
 
 def _portions(one: Region) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -136,7 +136,7 @@ def draw_chart(rows: list[Row], model_error: float) -> Figure:
         xycoords=("axes fraction", "data"),
         color="#777777",
         ha="right",
-        va="bottom",
+        va="top",
     )
     ax.set(xlabel="processor time [s]", ylabel="error of the peak pressure [-]")
     ax.set_title("A rigid cylinder on an elastic block, against Hertz", loc="left")

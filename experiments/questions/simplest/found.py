@@ -253,15 +253,17 @@ def spoilt_rows() -> list[Row]:
 def size_rows() -> list[Row]:
     """Half-planes instead of blocks of all thicknesses and cylinders of all curvatures: the error said and the error made."""
     rows = []
-    hertz = scenes.cylinder().reference
-    assert hertz is not None
-    for what, values in (("H / a", (1.5, 2.0, 4.0, 8.0, 16.0)), ("a / R", (0.05, 0.1, 0.2, 0.3))):
+    for what, rigid, values in (
+        ("H / a", "cylinder", (1.5, 2.0, 4.0, 8.0, 16.0)),
+        ("a / R", "foundation", (0.05, 0.1, 0.2, 0.3)),
+    ):
+        hertz = scenes.cylinder(rigid=rigid).reference
+        assert hertz is not None
         for value in values:
-            if what == "H / a":
-                changes: Row = {"foundation_height": value * hertz.half_width, "rigid": "cylinder"}
-            else:
-                changes = {"force": 100.0 * (value * 400.0 / hertz.half_width) ** 2, "rigid": "foundation"}
-            rows.append(_size(what, value, scenes.cylinder(mu=0.0, elements=32, **changes)))
+            changes: Row = {"foundation_height": value * hertz.half_width}
+            if what == "a / R":
+                changes = {"force": 100.0 * (value * 400.0 / hertz.half_width) ** 2}
+            rows.append(_size(what, value, scenes.cylinder(mu=0.0, elements=64, rigid=rigid, **changes)))
             print(rows[-1], flush=True)
     return rows
 
