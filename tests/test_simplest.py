@@ -374,6 +374,8 @@ def test_a_report_reads_well_and_names_are_known():
     with pytest.raises(InputError, match="must be a Scene"):
         simplify("punch-2d")
     assert not simplify(scenes.hertz_half_space()).found
+    with pytest.raises(InputError, match="no boundary named 'wall'"):
+        simplify(punch(support=(Support("wall"),)))
 
 
 def test_the_command_says_what_may_be_left_out_and_run_applies_it(tmp_path, capsys):

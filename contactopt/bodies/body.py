@@ -123,7 +123,7 @@ class Assembly:
 def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Assembly:
     """Mesh and assemble one Part of a Scene."""
     mesh = part.build_mesh(elements, zone)
-    _check_mesh(scene, part, mesh)
+    check_mesh(scene, part, mesh)
     axisymmetric = scene.kind == "axisymmetric"
     factor = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}[scene.kind] * scene.copies
     weight = (factor, axisymmetric)
@@ -167,7 +167,8 @@ def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     return replace(body, load=_load(part, body.basis, body.weight), prescribed=prescribed, plate_forces=plate_forces)
 
 
-def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
+def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
+    """Raise InputError unless a part's mesh fits the kind of the scene and has all boundaries that are named."""
     if not isinstance(mesh, skfem.Mesh) or mesh.p.shape[0] != scene.dim or mesh.refdom.__name__ not in SHAPES:
         raise InputError(
             f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension {scene.dim} made of "

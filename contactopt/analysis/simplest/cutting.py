@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import skfem
+from scipy.spatial import KDTree
 
 from contactopt.analysis.simplest.mirrors import Images, Plane
 from contactopt.analysis.simplest.shapes import Shapes
@@ -205,13 +206,35 @@ def crosses(mesh: Any, side: Side) -> bool:
 
 
 def is_mirrored(mesh: Any, image: Any, plane: Plane) -> bool:
-    """Whether the nodes of a mesh have the nodes of another one as their mirror images."""
-    from scipy.spatial import KDTree
-
-    if mesh.p.shape != image.p.shape:
+    """Whether the nodes and the elements of a mesh have those of another one as their mirror images."""
+    if mesh.p.shape != image.p.shape or mesh.t.shape != image.t.shape:
         return False
-    size = float(np.ptp(mesh.p, axis=1).max())
-    return bool(KDTree(image.p.T).query(plane.image(mesh.p).T)[0].max() < NEAR * size)
+    near = NEAR * float(np.ptp(mesh.p, axis=1).max())
+    middles, others = (each.p[:, each.t].mean(axis=1) for each in (mesh, image))
+    pairs = ((mesh.p, image.p), (middles, others))
+    return all(bool(KDTree(there.T).query(plane.image(here).T)[0].max() < near) for here, there in pairs)
+
+
+def matches(shapes: Shapes) -> bool:
+    """Whether the coupling of all pairs is blind to a cut: that of quadratic elements is, and that of matching nodes.
+
+    A mortar coupling of linear elements rounds off kinks by the nodes around (contactopt.interface.kinks), of which a plane of
+    symmetry hides one half.
+    """
+    if shapes.scene.degree == 2:
+        return True
+    for pair in shapes.scene.pairs:
+        nodes = []
+        for name, surface in zip(pair.bodies, pair.surfaces):
+            if name in shapes.parts:
+                mesh = shapes.meshes[name]
+                facets = mesh.boundaries[surface or shapes.parts[name].contact]
+                nodes.append(mesh.p[:, np.unique(mesh.facets[:, facets])])
+        if len(nodes) == 2 and nodes[0].shape != nodes[1].shape:
+            return False
+        if len(nodes) == 2 and KDTree(nodes[0].T).query(nodes[1].T)[0].max() > NEAR * shapes.size:
+            return False
+    return True
 
 
 def _clipped(mesh: Any, side: Side, curve_of: Callable[[str], Any]) -> Any:

@@ -1,7 +1,9 @@
 """The chosen numbers of these simplifications; `python -m experiments.questions.simplest` shows what they are worth."""
 
 # Half-spaces instead of bodies (contactopt.analysis.simplest.large_bodies).
-FINITE = 0.45  # error of the peak pressure times (size of the body over the contact half-width)^2, at most, in the plane
+FINITE = (
+    0.45  # error of the peak pressure times (size of the body over the contact half-width)^2, at most, in the plane
+)
 STEEP = 0.15  # error of the peak pressure over the square of the largest slope of the gap inside the contact
 WORST = 0.05  # estimated error up to which half-spaces are offered
 ACROSS = {2: 128, 3: 32}  # points across the contact half-width of the half-spaces that are offered, by dimension

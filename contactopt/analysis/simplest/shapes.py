@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.simplest.regions import Region, region
+from contactopt.bodies.body import check_mesh
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 
 
@@ -80,7 +81,10 @@ def shapes_of(scene: Scene) -> Shapes | None:
     parts = [part for part in scene.parts if isinstance(part, Part)]
     if not all(isinstance(part, (Part, Rigid)) for part in scene.parts):
         return None
-    return Shapes(scene, {part.name: part.build_mesh(scene.elements, scene.zone) for part in parts})
+    meshes = {part.name: part.build_mesh(scene.elements, scene.zone) for part in parts}
+    for part in parts:
+        check_mesh(scene, part, meshes[part.name])
+    return Shapes(scene, meshes)
 
 
 def sizes_of(scene: Scene) -> tuple[int, int]:

@@ -50,7 +50,7 @@ Scenes that look symmetric and are not. What spoils the symmetry is said where t
 
 ## Half-planes instead of blocks and cylinders
 
-The estimate is .45 (a / L)^2 + .15 s^2 and the misfit of the gap, with a the contact half-width, L the distance to the end of the
+The estimate is .5 (a / L)^2 + .15 s^2 and the misfit of the gap, with a the contact half-width, L the distance to the end of the
 bodies and s the slope of the gap at the edge of the contact; half-spaces are offered up to an estimate of 5 %.
 
 {{sizes}}

@@ -25,7 +25,7 @@ SIZE = 60 * A  # half-width and depth of the block
 DEGREE = 2  # of the finite elements
 UNIFORM = (64, 128, 192, 256)  # elements across the block
 GRADED = (3, 6, 12, 24)  # elements across the contact half-width
-GOALS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4)  # of adaptive refinement
+GOALS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4)  # of adaptive refinement
 POINTS = (16, 32, 64, 128, 256)  # of a half-plane
 
 Answer = tuple[int, float]  # unknowns, peak pressure
