@@ -1,7 +1,7 @@
 """Half-spaces instead of bodies that are large beside their contact.
 
 One coarse solve gives the half-width a of the contact, the total force, and the gap about it, which a polynomial of the distance
-continues. Two errors remain for the peak pressure, both measured on Hertz's contact (contactopt.analysis.simplest.estimates): that of
+continues. Two errors remain for the peak pressure, both measured on Hertz's contact (contactopt.analysis.simplest.constants): that of
 a body that ends at the distance L from the contact, FINITE (a / L)^2, and that of a surface that is not flat, STEEP times the square of
 its slope at the edge of the contact. The approach is not the same: it depends on the whole bodies.
 """
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.simplest.estimates import ACROSS, FINITE, REACH, STEEP
+from contactopt.analysis.simplest.constants import ACROSS, FINITE, REACH, STEEP
 from contactopt.analysis.simplest.regions import region
 from contactopt.analysis.solve_scene import Solved
 from contactopt.analysis.status import contact_status

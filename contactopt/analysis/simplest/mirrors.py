@@ -3,7 +3,8 @@
 The image of a body may be another body, as in an arch. Nothing is read from names or from meshes: boundaries are compared by
 where they lie (contactopt.analysis.simplest.regions), values by H = I - 2 n n', the reflection across a plane with the
 normal n. Candidates for n are the axes of space, the principal axes of the bodies, the normals of their flat sides and the
-lines half-way between these; candidates for the place are the centre of volume and the middle between the outermost nodes.
+lines half-way between these; candidates for the place are the centre of volume and the middle between the outermost nodes, rounded
+and as it is.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ from contactopt.scenes.scene import BodyForce, Plate, Support, Traction
 
 EQUAL = 1e-9  # relative difference of values that count as equal
 SIDES = 8  # normals of flat sides among the candidates, those of the largest sides
+ROUND = (
+    0.01  # of the size: where all bodies are round, their meshes do not know the middle, which is a round number then
+)
 SAMPLES = 200  # places at which gaps and friction that depend on the place are compared
 
 Map = Callable[[np.ndarray], np.ndarray]
@@ -106,19 +110,21 @@ class Mirror(NamedTuple):
 def find_mirrors(shapes: Shapes) -> tuple[list[Mirror], list[str]]:
     """All planes of mirror symmetry, and sentences about planes that only loads, supports, laws or gaps spoil."""
     found: list[Mirror] = []
-    spoilt: list[str] = []
-    broken: list[Plane] = []
+    spoilt: dict[str, Plane] = {}  # by the reason
     for plane in candidates(shapes):
-        if any(_equal_planes(plane, other, shapes.size) for other in (*(mirror.plane for mirror in found), *broken)):
+        if any(_equal_planes(plane, mirror.plane, shapes.size) for mirror in found):
             continue
         made = images_under(shapes, plane)
         if isinstance(made, Images):
             found.append(Mirror(plane, made))
         elif made is not None:
-            broken.append(plane)
-            where = plane.words(shapes.scene.components)
-            spoilt.append(f"The bodies are symmetric across the plane {where}, but {made}.")
-    return found, spoilt
+            spoilt.setdefault(made, plane)
+    notes = [
+        f"The bodies are symmetric across the plane {plane.words(shapes.scene.components)}, but {reason}."
+        for reason, plane in spoilt.items()
+        if not any(_equal_planes(plane, mirror.plane, shapes.size) for mirror in found)
+    ]
+    return found, notes
 
 
 def candidates(shapes: Shapes) -> Iterator[Plane]:
@@ -136,8 +142,9 @@ def candidates(shapes: Shapes) -> Iterator[Plane]:
             continue
         known.append(normal)
         along = normal @ points
-        places = {float((along.min() + along.max()) / 2), float(normal @ centre)}
-        for place in sorted(places, key=lambda at: abs(at - (along.min() + along.max()) / 2)):
+        middle, step = float(along.min() + along.max()) / 2, ROUND * shapes.size
+        places = (round(middle / step) * step, middle, float(normal @ centre))
+        for place in dict.fromkeys(places):
             yield Plane(normal, place)
 
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.simplest import joints, large_bodies
+from contactopt.analysis.simplest.constants import SHARE, WORST
 from contactopt.analysis.simplest.cutting import crosses, half_of, is_mirrored, matches, roller, side_of
-from contactopt.analysis.simplest.estimates import SHARE, WORST
 from contactopt.analysis.simplest.mirrors import Images, Mirror, Plane, find_mirrors, images_under
 from contactopt.analysis.simplest.sections import axisymmetric, plane_strain, prism, revolution
 from contactopt.analysis.simplest.shapes import Shapes, shapes_of, sizes_of
@@ -277,7 +277,7 @@ def _why_mirror(shapes: Shapes, plane: Plane, images: Images) -> tuple[str, floa
     elif not all(is_mirrored(mesh, shapes.meshes[images.bodies[name]], plane) for name, mesh in shapes.meshes.items()):
         text += " The mesh is not symmetric."
     elif not matches(shapes):
-        text += " Nodes of surfaces do not match, and linear elements are coupled a little differently at the plane."
+        text += " Nodes of surfaces do not lie on each other, and linear elements may be coupled a little differently at the plane."
     else:
         error = 0.0
     text += " Forces and areas stay those of the whole"
