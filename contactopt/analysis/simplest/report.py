@@ -174,19 +174,12 @@ def _shapes(found: list[Simplification], before: Shapes) -> Shapes:
 
 
 def _model(given: Scene, scene: Scene) -> str:
-    """'a quarter of the bodies in plane strain'."""
-    part = PARTS.get(scene.copies // given.copies, "")
-    kind = {"plane-strain": "in plane strain", "axisymmetric": "in an axisymmetric section", "solid": ""}[scene.kind]
-    bodies = (
-        f"one {part} of the bodies"
-        if part
-        else "the section of the bodies"
-        if scene.kind != given.kind
-        else "the bodies"
-    )
-    if part and given.copies > 1:
-        bodies = f"one {part} of what is modelled"
-    return f"{bodies} {kind}".strip() if scene.kind != given.kind else bodies
+    """'one quarter of the bodies', 'one half of a section in plane strain'."""
+    whole = "what is modelled" if given.copies > 1 else "the bodies"
+    if scene.kind != given.kind:
+        whole = {"plane-strain": "a section in plane strain"}.get(scene.kind, "an axisymmetric section")
+    part = PARTS.get(scene.copies // given.copies)
+    return f"one {part} of {whole}" if part else whole
 
 
 def _section(shapes: Shapes) -> tuple[list[Simplification], list[str]]:
