@@ -8,7 +8,7 @@ Four kinds of simplification are looked for, the exact ones first:
 
 | module | what may be left out | error |
 |---|---|---|
-| `sections.py` | the third dimension, of prisms between rollers and of bodies of revolution | none |
+| `prisms.py`, `revolution.py` | the third dimension, of prisms between rollers and of bodies of revolution | none |
 | `mirrors.py`, `cutting.py` | one half, across each plane of mirror symmetry | none |
 | `joints.py` | slip and opening of pairs that stick everywhere, friction of pairs that hardly rub | measured on a coarse mesh |
 | `large_bodies.py` | the mesh, where the contact is small beside the bodies | estimated, as measured on Hertz's contact |
@@ -18,6 +18,7 @@ solution is unique. On meshes with the symmetry of the scene the discrete soluti
 the error of the mesh.
 """
 
-from contactopt.analysis.simplest.report import Simplification, Simplified, simplify
+from contactopt.analysis.simplest.report import Simplification, Simplified
+from contactopt.analysis.simplest.search import simplify
 
 __all__ = ["Simplification", "Simplified", "simplify"]

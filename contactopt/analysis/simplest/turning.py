@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.simplest.mirrors import held_space
+from contactopt.analysis.simplest.images import held_space
 from contactopt.errors import InputError
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Plate, Rigid, Scene, Support

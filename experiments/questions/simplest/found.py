@@ -27,7 +27,7 @@ from contactopt import (
     simplify,
 )
 from contactopt.analysis.quantities import approach, elastic_energy
-from contactopt.analysis.simplest import Simplification
+from contactopt import Simplification
 from contactopt.analysis.simplest.turning import turned
 from contactopt.analysis.solve_scene import Solved, solve_scene
 from contactopt.scenes.meshes import rename, tensor_mesh
