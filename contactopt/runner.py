@@ -143,6 +143,7 @@ def run(
     accuracy: float | None = None,
     quantity: str | None = None,
     adaptive: bool = False,
+    simplest: bool = False,
     figures: Sequence[str] = ("png",),
     html: bool = False,
     note: Note = lambda text: None,
@@ -168,6 +169,8 @@ def run(
     adaptive : whether meshes are refined only where the quantity needs it (contactopt.adaptivity), each body by itself, and not
         everywhere; quadrilaterals become triangles. More quantities can be bounded then, see contactopt.derivatives.outputs
         All arguments from `method` to here may stand in a scene file; those given here win.
+    simplest : whether all that can be left out exactly is left out first: halves across planes of symmetry, the third dimension of
+        plates between rollers and of bodies of revolution (contactopt.simplify). `Result.scene` is what was solved
     figures : the formats in which figures are written, of png, svg and pdf; (): none are drawn, which saves half of the time
         of a small scene
     html : whether to write view.html too, the result as a page to explore (needs `pip install 'contactopt[view]'`)
@@ -193,6 +196,7 @@ def run(
 
     changes |= {} if elements is None else {"elements": elements}
     states = _states(scene, changes) if file is None else _states_of_file(file, changes)
+    states = _simplest(states, note) if simplest else states
     names = {"normal": normal, "tangential": tangential, "preconditioner": preconditioner}
     given = {key: choose(key, name) for key, name in names.items() if choose(key, name) is not None}
     method = choose("method", method) or default_method(given)
@@ -287,6 +291,39 @@ def _states(scene: Any, changes: dict[str, Any]) -> tuple[Scene, ...]:
         if name not in known:
             raise InputError(f"a Scene has no field {name!r}; its fields are {', '.join(known)}.")
     return (replace(scene, **changes),)
+
+
+def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:
+    """The scene that a name or a scene file stands for, of a load path its last state.
+
+    Parameters
+    ----------
+    scene, changes : as for run()
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InputError : for an unknown name, a file with a mistake, or changes that do not fit
+    """
+    file = _scene_file(scene)
+    return (_states(scene, changes) if file is None else _states_of_file(file, changes))[-1]
+
+
+def _simplest(states: tuple[Scene, ...], note: Note) -> tuple[Scene, ...]:
+    """The scene after all exact simplifications."""
+    if len(states) > 1:
+        raise InputError(
+            f"scene '{states[0].name}' has a load path, whose states would all have to be symmetric; ask contactopt.simplify "
+            "for each state."
+        )
+    from contactopt.analysis.simplest import simplify
+
+    found = simplify(states[0], solve=False)
+    note(found.needs)
+    return (found.scene,)
 
 
 def _form(Q: str, preconditioner: str | None) -> str:

@@ -141,7 +141,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         For a mesh that cannot be used, such as one in several pieces, and for supports and loads that do not fit.
     """
     mesh = part.build_mesh(elements, zone)
-    _check_mesh(scene, part, mesh)
+    check_mesh(scene, part, mesh)
     axisymmetric = scene.kind == "axisymmetric"
     factor = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}[scene.kind] * scene.copies
     weight = (factor, axisymmetric)
@@ -203,7 +203,24 @@ def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     return replace(body, load=_load(part, body.basis, body.weight), prescribed=prescribed, plate_forces=plate_forces)
 
 
-def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
+def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
+    """Check that a part's mesh fits the kind of the scene and has all boundaries that are named.
+
+    Parameters
+    ----------
+    scene
+        The scene of the part.
+    part
+        An elastic body of the scene.
+    mesh
+        Its mesh.
+
+    Raises
+    ------
+    InputError
+        If the mesh has another dimension, elements that are not known, numbers that are not finite, points on the wrong
+        side of an axis of revolution, or lacks a boundary that the part names.
+    """
     if not isinstance(mesh, skfem.Mesh) or mesh.p.shape[0] != scene.dim or mesh.refdom.__name__ not in SHAPES:
         raise InputError(
             f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension {scene.dim} made of "

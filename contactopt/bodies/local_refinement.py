@@ -43,9 +43,9 @@ def simplices(mesh: Any) -> Any:
     if is_curved(mesh):
         mesh = replace(straight(mesh), _boundaries=mesh.boundaries)
     if isinstance(mesh, skfem.MeshQuad):
-        return _named(mesh, replace(mesh.to_meshtri(), _boundaries=None))
+        return named_like(mesh, replace(mesh.to_meshtri(), _boundaries=None))
     if isinstance(mesh, skfem.MeshHex):
-        return _named(mesh, replace(mesh.to_meshtet(), _boundaries=None))
+        return named_like(mesh, replace(mesh.to_meshtet(), _boundaries=None))
     return mesh
 
 
@@ -63,7 +63,7 @@ def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Curve]) -> Any:
     A mesh of the same kind with the same named boundaries.
     """
     nameless = replace(mesh, _boundaries=None)  # scikit-fem would warn that it loses the names
-    fine = _named(mesh, nameless.refined(np.asarray(marked)))
+    fine = named_like(mesh, nameless.refined(np.asarray(marked)))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
     points = fine.p.copy()
     for name, curve in curves.items():
@@ -85,8 +85,21 @@ def _volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.det(np.moveaxis(edges, 2, 0)))
 
 
-def _named(old: Any, new: Any) -> Any:
-    """`new` with the named boundaries of `old`, whose boundary facets hold those of `new`."""
+def named_like(old: Any, new: Any) -> Any:
+    """Give a mesh the named boundaries of another one, whose boundary facets hold its own.
+
+    Parameters
+    ----------
+    old
+        A scikit-fem mesh with named boundaries.
+    new
+        A mesh of simplices of the same body, or of a part of it.
+
+    Returns
+    -------
+    mesh
+        `new` with the boundaries of `old`.
+    """
     if not old.boundaries:
         return new
     dim, facets, outer = len(old.p), old.boundary_facets(), new.boundary_facets()

@@ -76,6 +76,7 @@ def run(options: argparse.Namespace) -> int:
         accuracy=options.accuracy,
         quantity=options.quantity,
         adaptive=options.adaptive,
+        simplest=options.simplest,
         figures=tuple(options.figures),
         html=options.html,
         note=lambda text: None if silent else print(f"  {text}", file=sys.stderr, flush=True),
@@ -151,6 +152,14 @@ def show(options: argparse.Namespace) -> int:
     from contactopt.figures.sheet import describe
 
     print(describe(options.scene, _arguments_of(options.set)))
+    return 0
+
+
+def simplify(options: argparse.Namespace) -> int:
+    from contactopt.analysis.simplest import simplify
+    from contactopt.runner import scene_of
+
+    print(simplify(scene_of(options.scene, **_arguments_of(options.set)), solve=not options.no_solve))
     return 0
 
 

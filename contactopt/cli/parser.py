@@ -19,6 +19,7 @@ EPILOG = """Examples:
   contactopt run punch-2d                      solve a scene; write numbers, figures and fields into out/punch-2d
   contactopt run punch-2d --set width=30       the same with another value of an argument of the scene
   contactopt show punch-2d                     describe a scene: its arguments, and what is known exactly
+  contactopt simplify arch                     say what may be left out of a scene
   contactopt view out/punch-2d                 turn the result into a page to explore, and open it
 
 contactopt COMMAND --help shows the options of a command.
@@ -70,6 +71,16 @@ def make_parser() -> argparse.ArgumentParser:
     show.add_argument("scene", metavar="SCENE", help="a scene file (.toml), or " + ", ".join(SCENES))
     show.add_argument(
         "--set", metavar="NAME=VALUE", action="append", default=[], help="give an argument of the scene another value"
+    )
+    simple = add("simplify", "say what may be left out of a scene, why, and which error that makes", commands.simplify)
+    simple.add_argument("scene", metavar="SCENE", help="a scene file (.toml), or " + ", ".join(SCENES))
+    simple.add_argument(
+        "--set", metavar="NAME=VALUE", action="append", default=[], help="give an argument of the scene another value"
+    )
+    simple.add_argument(
+        "--no-solve",
+        action="store_true",
+        help="look only for what makes no error, which needs no solution of the scene",
     )
     new = add("new", "write an example of a scene file, to start from", commands.new)
     new.add_argument(
@@ -156,6 +167,11 @@ def _run(run: argparse.ArgumentParser) -> None:
     )
     run.add_argument(
         "--adaptive", action="store_true", help="with --accuracy: refine the mesh only where the quantity needs it"
+    )
+    run.add_argument(
+        "--simplest",
+        action="store_true",
+        help="first leave out all that can be left out without an error, as contactopt simplify says",
     )
     run.add_argument("--ranks", type=int, metavar="N", help="number of processes that share the bodies (needs mpi4py)")
     run.add_argument(
