@@ -20,6 +20,7 @@ from contactopt import (
     Plate,
     Rigid,
     Scene,
+    Simplification,
     Support,
     Traction,
     load_mesh,
@@ -27,7 +28,6 @@ from contactopt import (
     simplify,
 )
 from contactopt.analysis.quantities import approach, elastic_energy
-from contactopt import Simplification
 from contactopt.analysis.simplest.turning import turned
 from contactopt.analysis.solve_scene import Solved, solve_scene
 from contactopt.scenes.meshes import rename, tensor_mesh
