@@ -25,8 +25,8 @@ TEXT = f"""{(__doc__ or "").strip()}
 
 One scene, four models: a rigid cylinder on an elastic block, whose peak pressure Hertz knows. The finite elements are quadratic. The
 block is 120 contact half-widths wide and 60 deep, and ends there: `bias` is what that changes. Errors are root mean squares over
-five forces, because a mesh can fit one force by luck; seconds are the median of five runs, and those of the adaptive model are
-for all its meshes together.
+five forces, because a mesh can fit one force by luck; seconds are the least of the five, and those of the adaptive model are for
+all its meshes together.
 
 {{chart}}
 
