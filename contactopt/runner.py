@@ -15,7 +15,7 @@ import numpy as np
 from contactopt.analysis.accuracy import Estimate, refine
 from contactopt.analysis.paths import PathResult, solve_states
 from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
-from contactopt.analysis.resultants import tables
+from contactopt.analysis.resultants import mirrors, tables
 from contactopt.analysis.solve_scene import Options, Solved
 from contactopt.bodies.ranks import Team, spread
 from contactopt.cards import card, count, line
@@ -348,6 +348,7 @@ def _summary(
         "scene": reduction.scene.name,
         "kind": reduction.scene.kind,
         "units": list(reduction.scene.units),
+        "mirrors": mirrors(reduction),
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
         "mu": float(problem.mu.max(initial=0.0)),

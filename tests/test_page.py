@@ -12,6 +12,7 @@ from browser import CHROMIUM, Browser
 
 from contactopt import InputError, cli, run, scenes
 from contactopt.figures.page import certificate_words
+from contactopt.interface.recovery import recover
 
 
 def decoded(packed):
@@ -32,20 +33,46 @@ def folder(tmp_path_factory):
     return made
 
 
-def test_the_bodies_on_the_page_are_those_of_the_result(folder):
-    result = run(scenes.flat_punch(3, elements=3))
-    data = data_of(folder / "solid" / "view.html")
+def surface_area(points, cells):
+    first, second, third = points[cells].transpose(1, 0, 2)
+    return np.linalg.norm(np.cross(second - first, third - first), axis=1).sum() / 2
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_bodies_on_the_page_are_those_of_the_result(degree, tmp_path):
+    result = run(scenes.flat_punch(3, elements=3 - degree), tmp_path, figures=(), html=True, degree=degree)
+    data = data_of(tmp_path / "view.html")
     for fields in result.fields:
         (body,) = (body for body in data["bodies"] if body["name"] == fields.name)
         points, cells = decoded(body["points"]), decoded(body["cells"])
-        surface = fields.mesh.p.T[np.unique(fields.mesh.facets[:, fields.mesh.boundary_facets()])]
-        assert np.allclose(np.sort(points, axis=0), np.sort(surface, axis=0), rtol=1e-6)
-        first, second, third = points[cells].transpose(1, 0, 2)
-        area = np.linalg.norm(np.cross(second - first, third - first), axis=1).sum() / 2
+        assert np.allclose(points, fields.mesh.p.T, rtol=1e-6)  # with those in the middle of edges and those inside
         x, y, z = np.ptp(fields.mesh.p, axis=1)
-        assert area == pytest.approx(2 * (x * y + y * z + z * x), rel=1e-5)  # the whole surface of the block, once
-        assert decoded(body["values"]["von_mises"]).max() <= fields.von_mises.max() * (1 + 1e-6)
-        assert len(decoded(body["values"]["stress_xz"])) == len(points)
+        assert surface_area(points, cells) == pytest.approx(2 * (x * y + y * z + z * x), rel=1e-5)  # of the block, once
+        assert np.allclose(decoded(body["values"]["von_mises"])[0], fields.von_mises, rtol=1e-5)
+        assert np.allclose(decoded(body["move"])[0], fields.displacement.T, rtol=1e-5, atol=1e-9)
+        assert decoded(body["values"]["stress_xz"]).shape == (1, len(points))
+        assert decoded(body["edges"]).max() < len(points) > decoded(body["lines"]).max()
+
+
+def test_the_inside_of_large_bodies_is_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr("contactopt.figures.page.MOST_INSIDE", 10)
+    result = run(scenes.flat_punch(3, elements=2), tmp_path, figures=(), html=True)
+    for body in data_of(tmp_path / "view.html")["bodies"]:
+        (fields,) = (fields for fields in result.fields if fields.name == body["name"])
+        surface = fields.mesh.p.T[np.unique(fields.mesh.facets[:, fields.mesh.boundary_facets()])]
+        points = decoded(body["points"])
+        assert np.allclose(np.sort(points, axis=0), np.sort(surface, axis=0), rtol=1e-6)
+        assert not decoded(body["inside"]).size
+        x, y, z = np.ptp(surface, axis=0)
+        assert surface_area(points, decoded(body["cells"])) == pytest.approx(2 * (x * y + y * z + z * x), rel=1e-5)
+
+
+def test_half_models_are_shown_whole(folder):
+    data = data_of(folder / "solid" / "view.html")
+    assert sorted(data["mirrors"]) == [[0, 0.0], [1, 0.0]]  # a quarter of the block
+    low, high = np.array(data["box"])
+    assert np.allclose(low[:2], -high[:2])
+    assert data_of(folder / "flat" / "view.html")["mirrors"] == [[0, 0.0]]
 
 
 def test_every_state_of_a_path_is_on_the_page(folder):
@@ -53,6 +80,7 @@ def test_every_state_of_a_path_is_on_the_page(folder):
     data = data_of(folder / "path" / "view.html")
     (pair,) = data["contacts"]
     assert data["states"] == len(path.states)
+    names = [part.name for part in path.reduction.scene.parts]
     for number, state in enumerate(path.states):
         r, areas = state.solution.reactions, path.reduction.problem.areas
         assert np.allclose(decoded(pair["states"]["pressure"])[number], r[:, 0] / areas, rtol=1e-5, atol=1e-9)
@@ -61,7 +89,25 @@ def test_every_state_of_a_path_is_on_the_page(folder):
         assert (np.sum(status == 1), np.sum(status == 2)) == (stick, slip)
         bound, along = (decoded(pair["states"][name])[number] for name in ("bound", "along"))
         assert np.allclose(bound[status == 2], np.abs(along[status == 2]), rtol=1e-5)
+        gap, slip = (decoded(pair["states"][name])[number] for name in ("gap", "slip"))
+        assert np.allclose(gap, state.displacements[:, 0], atol=1e-9)
+        assert np.allclose(slip, np.abs(state.slip[:, 0]), rtol=1e-4, atol=1e-9)
+        force = np.einsum("kad,ka->kd", path.reduction.frames, r) / areas[:, None]
+        assert np.allclose(decoded(pair["states"]["vector"])[number, :, :2], force, rtol=1e-4, atol=1e-7)
+        for fields, body in zip(path.fields(number), sorted(data["bodies"], key=lambda b: names.index(b["name"]))):
+            assert fields.name == body["name"] and data["moving"]
+            assert np.allclose(decoded(body["move"])[number, :, :2], fields.displacement.T, rtol=1e-4, atol=1e-9)
+            assert np.allclose(decoded(body["values"]["von_mises"])[number], fields.von_mises, rtol=1e-4)
     assert np.allclose(data["history"]["shear_force"], path.history["shear_force"])
+    assert np.allclose(path.fields(-1)[0].stress, recover(path.reduction, path.solution)[0].stress)
+
+
+def test_bodies_of_long_paths_stay_and_the_page_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr("contactopt.figures.output.MOST_NUMBERS", 1000)
+    run("cattaneo-2d", tmp_path, steps=2, elements=8, figures=(), html=True)
+    text, data = (tmp_path / "view.html").read_text(), data_of(tmp_path / "view.html")
+    assert not data["moving"] and len(decoded(data["bodies"][0]["move"])) == 1
+    assert "The bodies are those of the last state" in text and not (tmp_path / "states.npz").exists()
 
 
 def test_the_page_stands_alone_and_is_small(folder):

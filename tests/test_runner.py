@@ -13,6 +13,7 @@ KEYS = [
     "scene",
     "kind",
     "units",
+    "mirrors",
     "dofs",
     "contact_nodes",
     "mu",

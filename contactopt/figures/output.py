@@ -17,14 +17,18 @@ from contactopt.problem import alone, part_of
 from contactopt.scenes.scene import HalfSpace
 
 if TYPE_CHECKING:
+    from contactopt.analysis.paths import PathResult
+    from contactopt.interface.recovery import Fields
     from contactopt.runner import Result
 
 PAGE = "view.html"
 PICTURES = ("deformed", "maps", "pressure", "path")
+STATES = "states.npz"
+MOST_NUMBERS = 2_000_000  # of the bodies at all states of a load path, above which only the last state is written
 # What a run writes beside summary.json and one VTU file per body.
 RUN_FILES = (
     *(f"{name}.{ending}" for name in PICTURES for ending in FORMATS),
-    PAGE, "interface.npz", "history.csv", "path.npz",
+    PAGE, "interface.npz", "history.csv", "path.npz", STATES,
 )  # fmt: skip
 
 
@@ -83,6 +87,26 @@ def write(result: Result, folder: Path) -> None:
     )
     if result.path is not None:
         result.path.write(folder)
+        states = body_states(result.path, result.fields)
+        if states:
+            np.savez(folder / STATES, **states)
+
+
+def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
+    """The bodies at the n states of a load path, by "QUANTITY/BODY": displacement (n, nodes, dim), stress (n, nodes, c), von_mises.
+
+    Numbers have four bytes. It is empty where there would be more than MOST_NUMBERS, or where the path kept no displacements.
+    """
+    numbers = len(path.states) * sum(own.displacement.size + own.stress.size + own.von_mises.size for own in last)
+    if not path.states[-1].bodies or not 0 < numbers <= MOST_NUMBERS:
+        return {}
+    fields = [path.fields(step) for step in range(len(path.states))]
+    made = {}
+    for own in zip(*fields):
+        made[f"displacement/{own[0].name}"] = np.array([f.displacement.T for f in own], dtype=np.float32)
+        made[f"stress/{own[0].name}"] = np.array([f.stress for f in own], dtype=np.float32)
+        made[f"von_mises/{own[0].name}"] = np.array([f.von_mises for f in own], dtype=np.float32)
+    return made
 
 
 def earlier_files(folder: Path) -> set[str]:
