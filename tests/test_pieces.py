@@ -53,9 +53,12 @@ def test_plane_elements_are_covered_once(pair, degree):
 def test_solid_elements_show_their_boundary_and_can_be_cut(pair, degree):
     mesh = unit(pair, degree)
     points, (kind, elements) = mesh.p.T, elements_of(mesh)
-    plane, faces = surface(kind, elements)
+    plane, faces = surface(kind, elements, points)
     flat = pieces(plane, faces)
     assert area(points, flat) == pytest.approx(6)
+    corners = points[flat]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.all(np.sum(outward * (corners.mean(axis=1) - 0.5), axis=1) > 0)
     on_boundary = np.any((points == 0) | (points == 1), axis=1)
     assert set(flat.ravel()) == set(np.flatnonzero(on_boundary))
     assert length(points, sharp_edges(plane, faces, points, 0.9)) == pytest.approx(12)

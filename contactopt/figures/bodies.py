@@ -105,7 +105,7 @@ def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float
     drawn = []
     for f in fields:
         points = (f.mesh.p + scale * f.displacement).T
-        plane, faces = surface(*elements_of(f.mesh))
+        plane, faces = surface(*elements_of(f.mesh), points)
         cells = triangles(pieces(plane, faces))
         opposite = np.stack([cells[:, [1, 2]], cells[:, [2, 0]], cells[:, [0, 1]]], axis=1)
         lined = np.isin(_key(opposite, len(points)), _key(segments(mesh_lines(plane, faces)), len(points)))

@@ -29,6 +29,7 @@ APART = 1e-3  # a gap above this fraction of the largest displacement: bodies th
 REACH = 4.0  # sizes of a small contact surface that the first picture of large bodies shows
 TOP = 0.998  # quantile of the von Mises stress where the colours end: singular corners would take them all
 SHARP = np.cos(np.deg2rad(30))  # cosine of the angle between two faces from which on their edge is drawn
+ON_PLANE = 1e-9  # of the size of a body, within which a node lies in a plane of symmetry
 MOST_INSIDE = 40_000  # nodes of all bodies in space, up to which the page holds their inside, so that it can be cut
 WORDS = {
     "approach": "approach of the bodies",
@@ -102,7 +103,7 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         "scale": 1.0 if apart else max(1.0, visible),
         "most_scale": 2.0 * max(1.0, visible),
         "top": float(np.quantile(np.concatenate(stresses), TOP)) if stresses else 1.0,
-        "bodies": [{"name": name} | _body_arrays(mesh, fields[name], inside) for name, mesh in bodies.items()],
+        "bodies": [{"name": name} | _body_arrays(mesh, fields[name], mirrors, inside) for name, mesh in bodies.items()],
         "contacts": contacts,
         "states": 1 if path is None else len(path["reactions"]),
         "moving": moving is not None,
@@ -151,16 +152,18 @@ def _body_values(name: str, mesh: Any, moving: dict[str, np.ndarray] | None) -> 
     return {"move": move, "von_mises": moving[f"von_mises/{name}"]} | dict(zip(parts, np.moveaxis(stress, 2, 0)))
 
 
-def _body_arrays(mesh: Any, values: dict[str, np.ndarray], inside: bool) -> dict[str, Any]:
-    """What is drawn of a body: its surface, in 2D all of it, and with `inside` its elements; values at their nodes."""
+def _body_arrays(mesh: Any, values: dict[str, np.ndarray], mirrors: list[list[Any]], inside: bool) -> dict[str, Any]:
+    """What is drawn of a body: its surface, in 2D all of it, and with `inside` its elements; values at their nodes.
+
+    What lies in a plane of symmetry is apart, because it belongs to no surface and no edge of the whole body.
+    """
     (block,) = mesh.cells
-    kind, faces = surface(block.type, block.data)
-    drawn = {
-        "cells": triangles(pieces(kind, faces)),
-        "edges": segments(outline(kind, faces) if block.dim == 2 else sharp_edges(kind, faces, mesh.points, SHARP)),
-        "lines": segments(mesh_lines(kind, faces)),
-        "inside": solids(block.type, block.data) if inside else np.zeros((0, 4), dtype=int),
-    }
+    kind, faces = surface(block.type, block.data, mesh.points)
+    sharp = outline(kind, faces) if block.dim == 2 else sharp_edges(kind, faces, mesh.points, SHARP)
+    drawn = {"lines": segments(mesh_lines(kind, faces))}
+    drawn["cells"], drawn["cut_cells"] = _apart(triangles(pieces(kind, faces)), mesh.points, mirrors)
+    drawn["edges"], drawn["cut_edges"] = _apart(segments(sharp), mesh.points, mirrors)
+    drawn["inside"] = solids(block.type, block.data) if inside else np.zeros((0, 4), dtype=int)
     nodes = np.arange(len(mesh.points)) if inside else np.unique(faces)
     place = np.zeros(len(mesh.points), dtype=int)
     place[nodes] = np.arange(len(nodes))
@@ -170,6 +173,15 @@ def _body_arrays(mesh: Any, values: dict[str, np.ndarray], inside: bool) -> dict
         "move": packed(values["move"][:, nodes]),
         **{name: packed(place[numbers]) for name, numbers in drawn.items()},
     }
+
+
+def _apart(items: np.ndarray, points: np.ndarray, mirrors: list[list[Any]]) -> tuple[np.ndarray, np.ndarray]:
+    """The items (m, c) of nodes outside all planes of symmetry, and those within one."""
+    size = float(np.ptp(points, axis=0).max())
+    within = np.zeros(len(items), dtype=bool)
+    for axis, place in mirrors:
+        within |= np.all(np.abs(points[items, axis] - place) <= ON_PLANE * size, axis=1)
+    return items[~within], items[within]
 
 
 def _motion(bodies: dict[str, Any], fields: dict[str, dict[str, np.ndarray]], points: np.ndarray) -> np.ndarray:

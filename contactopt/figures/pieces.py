@@ -48,15 +48,39 @@ EDGES = {
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
     "quad9": ((0, 4, 1), (1, 5, 2), (2, 6, 3), (3, 7, 0)),
 }
+# the same plane elements numbered the other way round
+TURNED = {
+    "triangle": (0, 2, 1),
+    "triangle6": (0, 2, 1, 5, 4, 3),
+    "quad": (0, 3, 2, 1),
+    "quad9": (0, 3, 2, 1, 7, 6, 5, 4, 8),
+}
 CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad9": 4}
 
 
-def surface(kind: str, elements: np.ndarray) -> tuple[str, np.ndarray]:
-    """The plane elements (kind, nodes (m, v)) that a body shows: itself in the plane, its boundary in space."""
+def surface(kind: str, elements: np.ndarray, points: np.ndarray) -> tuple[str, np.ndarray]:
+    """The plane elements that a body shows: itself in the plane; in space its boundary, each face numbered as seen from outside.
+
+    Parameters
+    ----------
+    kind, elements : name of the elements and their nodes (e, v)
+    points : (n, dim) places of the nodes
+
+    Returns
+    -------
+    kind, nodes (m, v)
+    """
     if kind not in FACES:
         return kind, elements
     faces = np.concatenate([elements[:, list(face)] for face in FACES[kind]])
-    return PLANE[kind], faces[_alone(faces[:, : CORNERS[PLANE[kind]]])]
+    plane = PLANE[kind]
+    alone = _alone(faces[:, : CORNERS[plane]])
+    owners, faces = elements[alone % len(elements)], faces[alone]
+    corners = points[faces[:, : CORNERS[plane]]]
+    outward = corners.mean(axis=1) - points[owners].mean(axis=1)
+    inside_out = np.sum(_normals(corners) * outward, axis=1) < 0
+    faces[inside_out] = faces[inside_out][:, TURNED[plane]]
+    return plane, faces
 
 
 def solids(kind: str, elements: np.ndarray) -> np.ndarray:
@@ -94,15 +118,14 @@ def sharp_edges(kind: str, elements: np.ndarray, points: np.ndarray, cosine: flo
     points  (n, 3) places of the nodes
     """
     edges = _edges(kind, elements)
-    corners = points[elements[:, : CORNERS[kind]]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
+    normals = _normals(points[elements[:, : CORNERS[kind]]])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     face = np.tile(np.arange(len(elements)), CORNERS[kind])
     key = np.sort(edges[:, [0, -1]], axis=1)
     order = np.lexsort(key.T)
     same = np.all(key[order[1:]] == key[order[:-1]], axis=1)
     one, other = order[:-1][same], order[1:][same]
-    flat = np.abs(np.sum(normals[face[one]] * normals[face[other]], axis=1))
+    flat = np.sum(normals[face[one]] * normals[face[other]], axis=1)
     return np.asarray(edges[one[flat < cosine]])
 
 
@@ -113,6 +136,11 @@ def segments(lines: np.ndarray) -> np.ndarray:
 
 def _edges(kind: str, elements: np.ndarray) -> np.ndarray:
     return np.concatenate([elements[:, list(edge)] for edge in EDGES[kind]])
+
+
+def _normals(corners: np.ndarray) -> np.ndarray:
+    """Normals (m, 3) of plane elements with corners (m, c, 3), of no particular length."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
 
 
 def _alone(corners: np.ndarray) -> np.ndarray:

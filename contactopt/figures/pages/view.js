@@ -3,7 +3,7 @@ const [LENGTH, STRESS] = data.units;
 const flat = data.dim === 2;
 const opened = (item) => Object.fromEntries(Object.entries(item).map(([name, value]) => [name, value.type ? unpack(value) : value]));
 const bodies = data.bodies.map((body) => ({...opened(body), values: opened(body.values), shown: true, corners: body.inside.shape[1]}));
-const contacts = data.contacts.map((pair) => ({...opened(pair), states: opened(pair.states), shown: true, corners: 4, inside: []}));
+const contacts = data.contacts.map((pair) => ({...opened(pair), states: opened(pair.states), shown: true, corners: 4, inside: [], cut_cells: []}));
 const CONTACT = {
   pressure: ["pressure", STRESS], traction: ["size of the tangential traction", STRESS], status: ["stick, slip, open", ""],
   gap: ["gap", LENGTH], slip: ["size of the slip", LENGTH],
@@ -55,19 +55,45 @@ function placed(item) {  // places of the nodes of all images shown, one image a
   return xyz;
 }
 
+const whole = (item, name) => (now.whole ? item[name] : Int32Array.from([...item[name], ...item[`cut_${name}`]]));  // with what lies in the planes of symmetry
+
+function lifted(xyz, cells) {  // places a little outside the surface, so that lines on it are not hidden
+  const size = Math.max(...data.box[0].map((low, c) => data.box[1][c] - low)), up = xyz.map((x) => new Float64Array(x.length));
+  if (flat) return [xyz[0], xyz[1], xyz[2].map(() => LIFT * size)];
+  for (let i = 0; i < cells.length; i += 3) {
+    const [a, b, d] = [cells[i], cells[i + 1], cells[i + 2]], e = xyz.map((x) => x[b] - x[a]), f = xyz.map((x) => x[d] - x[a]);
+    const normal = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]], length = Math.hypot(...normal) || 1;
+    for (const node of [a, b, d]) for (let c = 0; c < 3; c++) up[c][node] += normal[c] / length;
+  }
+  return xyz.map((x, c) => x.map((value, i) => value + (LIFT * size * up[c][i]) / (Math.hypot(up[0][i], up[1][i], up[2][i]) || 1)));
+}
+
 const repeated = (values, name = "") => (shownImages().length === 1 ? values : Float32Array.from(shownImages().flatMap((image) => [...values].map((value) => sign(name, image) * value))));
 const numbered = (cells, length) => (shownImages().length === 1 ? cells : Int32Array.from(shownImages().flatMap((_, k) => [...cells].map((node) => node + k * length))));
+
+function facing(cells, length) {  // triangles of all images: those of a mirror image turn the other way round
+  const made = numbered(cells, length);
+  shownImages().forEach((image, k) => {
+    if (image.length % 2) for (let i = k * cells.length; i < (k + 1) * cells.length; i += 3) [made[i + 1], made[i + 2]] = [made[i + 2], made[i + 1]];
+  });
+  return made;
+}
 
 const TETRAHEDRA = [[0, 1, 3, 4], [1, 2, 3, 6], [1, 3, 4, 6], [3, 4, 6, 7], [1, 4, 5, 6]];  // of a hexahedron
 
 function shaped(item, quantity) {  // what is drawn of an item: places, values, triangles, the node behind each place, and lines
-  const xyz = placed(item), length = count(item), made = {xyz, values: repeated(...quantity), cells: numbered(item.cells, length), from: null, lines: (pairs) => lines(xyz, numbered(pairs, length))};
+  const xyz = placed(item), length = count(item), cells = facing(whole(item, "cells"), length);
+  const made = {xyz, values: repeated(...quantity), cells, from: null, lines: (pairs) => lines(lifted(xyz, cells), numbered(pairs, length))};
   return now.cut === "" ? made : cut(item, made, length);
 }
 
-function cut(item, whole, length) {  // what lies below the plane, closed by the section through the elements
-  const axis = Number(now.cut), [low, high] = data.box, place = low[axis] + now.place * (high[axis] - low[axis]);
-  const xyz = whole.xyz.map((x) => [...x]), found = [...whole.values], from = [...found.keys()], cells = [], height = (i) => xyz[axis][i] - place;
+function knifeAt() {  // axis of the section, its place, and a function that is positive on what is cut off: the side of the eye at first
+  const axis = Number(now.cut), [low, high] = data.box, place = low[axis] + now.place * (high[axis] - low[axis]), turn = axis < 2 ? -1 : 1;
+  return {axis, place, beyond: (x) => turn * (x - place)};
+}
+
+function cut(item, whole, length) {  // what lies on one side of a plane, closed by the section through the elements
+  const {axis, beyond} = knifeAt(), xyz = whole.xyz.map((x) => [...x]), found = [...whole.values], from = [...found.keys()], cells = [], height = (i) => beyond(xyz[axis][i]);
   const split = (made, a, b) => {  // the place on the line from a to b where the plane cuts it, made once
     const key = a < b ? a * from.length + b : b * from.length + a;
     if (!made.known.has(key)) {
@@ -106,7 +132,7 @@ function cut(item, whole, length) {  // what lies below the plane, closed by the
       const [a, b] = [numbers[i], numbers[i + 1]], one = height(a) <= 0, other = height(b) <= 0;
       if (one && other) left.push(a, b); else if (one || other) left.push(one ? a : b, split(skin, a, b));
     }
-    return lines(xyz, left);
+    return lines(lifted(xyz, cells), left);
   };
   return {xyz, values: found, cells, from: [...from, ...origins], lines: drawn};
 }
@@ -141,7 +167,7 @@ function bodyTraces() {
     }];
     for (const [name, width, shade] of [["lines", 1, "rgba(0,0,0,0.35)"], ["edges", 2, "rgba(0,0,0,0.8)"]]) {
       if (!now[name]) continue;
-      const [ex, ey, ez] = shape.lines(body[name]);
+      const [ex, ey, ez] = shape.lines(name === "edges" ? whole(body, name) : body[name]);
       made.push({type: "scatter3d", mode: "lines", x: ex, y: ey, z: ez, line: {color: shade, width}, hoverinfo: "skip", showlegend: false});
     }
     return made;
@@ -186,6 +212,7 @@ function arrows(pair) {
   all.forEach((image, k) => {
     for (let n = 0; n < touching.length; n += step) {
       const i = touching[n];
+      if (now.cut !== "" && knifeAt().beyond(xyz[Number(now.cut)][k * length + i]) > 0) continue;
       for (let c = 0; c < 3; c++) {
         const turn = image.some(([axis]) => axis === c) ? -1 : 1, foot = xyz[c][k * length + i], tip = foot + (turn * arrowLength * force[3 * i + c]) / largest;
         made[c].push(foot, tip, null);
@@ -211,13 +238,21 @@ function probeTrace() {
 const axis = (name) => ({title: {text: plain(`${name} [${LENGTH}]`)}, showbackground: false, zeroline: false, showspikes: false});
 const HOME = flat ? {eye: {x: 0, y: 0, z: 2.2}, up: {x: 0, y: 1, z: 0}, center: {x: 0, y: 0, z: 0}} : {eye: {x: -1.1, y: -1.5, z: 0.7}, up: {x: 0, y: 0, z: 1}, center: {x: 0, y: 0, z: 0}};
 const MARGIN = 0.05;  // of the size of the box, about it
-const FRONT = 0.54;
+const FRONT = flat ? 0.54 : 0.42;
+const LIFT = 0.002;  // of the size of the box, by which lines stand off the surface
+
+function axesOfView() {  // unit vectors to the right and up in the first picture of solids
+  const {x, y, z} = HOME.eye, size = Math.hypot(x, y, z), flatSize = Math.hypot(x, y);
+  return [[-y / flatSize, x / flatSize, 0], [(-x * z) / flatSize / size, (-y * z) / flatSize / size, flatSize / size]];
+}
 
 function boxed() {  // ranges of the axes, and the size of the picture: in a parallel projection that of the aspect ratio
   const [low, high] = now.box, size = Math.max(...low.map((value, c) => high[c] - value)), rim = MARGIN * size, made = {"scene.aspectmode": "manual"};
-  // In the front view one unit of the aspect ratio is about FRONT of the height between the colour bars.
+  // One unit of the aspect ratio is about FRONT of the height between the colour bars.
   const height = view.clientHeight - 120, share = low.map((value, c) => (high[c] - value) / size + 2 * MARGIN);
-  const tall = flat ? Math.min(0.85 / share[1], (0.8 * view.clientWidth) / height / share[0]) / FRONT : Math.min(1.6, (2 * view.clientWidth) / height);
+  const room = flat ? [0.8, 0.85] : [0.75, 0.78], [right, up] = flat ? [[1, 0, 0], [0, 1, 0]] : axesOfView();
+  const [across, tallest] = [right, up].map((way) => share.reduce((sum, value, c) => sum + Math.abs(way[c]) * value, 0));
+  const tall = Math.min(room[1] / tallest, (room[0] * view.clientWidth) / height / across) / FRONT;
   ["x", "y", "z"].forEach((name, c) => {
     const thin = flat && c === 2, a = thin ? -size / 10 : low[c] - rim, b = thin ? size / 10 : high[c] + rim;
     made[`scene.${name}axis.range`] = [a, b];
@@ -234,6 +269,13 @@ const layout = {
   },
 };
 const config = {responsive: true, displaylogo: false};
+
+function deepen() {  // plotly's depth buffer reaches 1000 units either way; a picture of a few units needs a finer one to tell lines from surfaces
+  const plot = view._fullLayout?.scene?._scene?.glplot, {x, y, z} = view.layout.scene.aspectratio || {x: 1, y: 1, z: 1};
+  if (!plot || !plot.zFar) return;
+  plot.zFar = 8 * Math.max(x, y, z);
+  plot.redraw?.();
+}
 
 function draw() {
   Plotly.react(view, [...bodyTraces(), ...contactTraces(), ...probeTrace()], layout, config);
@@ -296,7 +338,7 @@ function drawContact() {
       marker: {color: state(pair, now.contact), colorscale: now.contact === "status" ? [[0, COLOURS.grey], [0.5, COLOURS.blue], [1, COLOURS.orange]] : "Cividis", showscale: now.contact !== "status", size: 7, symbol: "square"},
       hovertemplate: `x %{x:.4g}, y %{y:.4g} ${plain(LENGTH)}<br>${name} %{marker.color:.4g} ${plain(unit)}<br>%{text}<extra></extra>`,
     };
-    Plotly.react(chart, [trace], {...common, xaxis: {title: {text: plain(`x on the surface [${LENGTH}]`)}}, yaxis: {title: {text: plain(`y on the surface [${LENGTH}]`)}, scaleanchor: "x"}}, config);
+    Plotly.react(chart, [trace], {...common, xaxis: {title: {text: plain(`x on the surface [${LENGTH}]`)}, constrain: "domain"}, yaxis: {title: {text: plain(`y on the surface [${LENGTH}]`)}, scaleanchor: "x", constrain: "domain"}}, config);
     return;
   }
   const bound = state(pair, "bound"), traction = state(pair, "along"), order = [...pair.place.keys()].sort((a, b) => pair.place[a] - pair.place[b]);
@@ -350,8 +392,8 @@ for (const name of ["arrows", "clear", "edges", "lines", "whole"]) {
 control("whole-control").hidden = !data.mirrors.length;
 control("cut-control").hidden = flat || !bodies.length;
 const knife = control("cut-place"), cutWords = () => {
-  const [low, high] = data.box, axis = Number(now.cut);
-  control("cut-words").textContent = now.cut === "" ? "" : `up to ${data.axes[axis]} = ${number(low[axis] + now.place * (high[axis] - low[axis]))} ${LENGTH}` + (bodies.some((body) => body.inside.length) ? "" : "; the inside is too large for this page");
+  const {axis, place} = knifeAt();
+  control("cut-words").textContent = now.cut === "" ? "" : `${axis < 2 ? "from" : "up to"} ${data.axes[axis]} = ${number(place)} ${LENGTH}` + (bodies.some((body) => body.inside.length) ? "" : "; the inside is too large for this page");
   knife.disabled = now.cut === "";
 };
 choices("cut", [["", "nothing"], ...data.axes.map((name, axis) => [axis, name])], "", (value) => { now.cut = value; cutWords(); });
@@ -389,6 +431,8 @@ control("peak").addEventListener("click", () => {
 });
 everything();
 show(now.box);
+view.on("plotly_relayout", deepen);
+deepen();
 view.on("plotly_click", ({points: [point]}) => {
   if (!point.data.meta) return;
   const {from, ...place} = point.data.meta, item = place.body === undefined ? contacts[place.contact] : bodies[place.body];
