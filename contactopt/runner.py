@@ -105,7 +105,7 @@ class Result:
         if file is None:
             file = Path(tempfile.mkdtemp(prefix="contactopt-")) / PAGE
         with tempfile.TemporaryDirectory() as folder:
-            write(self, Path(folder))
+            write(self, Path(folder), states=True)
             (Path(folder) / "summary.json").write_text(json.dumps(self.summary))
             made = write_page(folder, file)
         if show:
@@ -252,7 +252,7 @@ def _finish(
             with _clock(seconds, "figures"):
                 draw(made, folder, formats)
         with _clock(seconds, "files"):
-            write(made, folder)
+            write(made, folder, states="html" in files)
         made = replace(made, summary=summary | _seconds(seconds, start))
         (folder / "summary.json").write_text(json.dumps(made.summary, indent=2) + "\n")
         if "html" in files:

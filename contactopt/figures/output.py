@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PAGE = "view.html"
 PICTURES = ("deformed", "maps", "pressure", "path")
 STATES = "states.npz"
-MOST_NUMBERS = 2_000_000  # of the bodies at all states of a load path, above which only the last state is written
+MOST_NUMBERS = 3_000_000  # of the bodies at all states of a load path, above which only the last state is written
 # What a run writes beside summary.json and one VTU file per body.
 RUN_FILES = (
     *(f"{name}.{ending}" for name in PICTURES for ending in FORMATS),
@@ -61,8 +61,11 @@ def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
         save(path_figure(result.path), "path")
 
 
-def write(result: Result, folder: Path) -> None:
-    """The fields of a result as VTU files, its contact forces and its load path as arrays."""
+def write(result: Result, folder: Path, states: bool) -> None:
+    """The fields of a result as VTU files, its contact forces and its load path as arrays.
+
+    states  whether to write the bodies at all states of the path, too, for a page on which they move
+    """
     surfaces = contact_fields(result.reduction, result.solution)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
         fields.write_vtu(folder / f"{fields.name}.vtu")
@@ -87,24 +90,21 @@ def write(result: Result, folder: Path) -> None:
     )
     if result.path is not None:
         result.path.write(folder)
-        states = body_states(result.path, result.fields)
-        if states:
-            np.savez(folder / STATES, **states)
+        if states and (found := body_states(result.path, result.fields)):
+            np.savez(folder / STATES, **found)
 
 
 def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
-    """The bodies at the n states of a load path, by "QUANTITY/BODY": displacement (n, nodes, dim), stress (n, nodes, c), von_mises.
+    """The bodies at the n states of a path, by "QUANTITY/BODY": displacement (n, nodes, dim) and von_mises (n, nodes).
 
-    Numbers have four bytes. It is empty where there would be more than MOST_NUMBERS, or where the path kept no displacements.
+    It is empty where there would be more than MOST_NUMBERS, or where the path kept no displacements.
     """
-    numbers = len(path.states) * sum(own.displacement.size + own.stress.size + own.von_mises.size for own in last)
+    numbers = len(path.states) * sum(own.displacement.size + own.von_mises.size for own in last)
     if not path.states[-1].bodies or not 0 < numbers <= MOST_NUMBERS:
         return {}
-    fields = [path.fields(step) for step in range(len(path.states))]
     made = {}
-    for own in zip(*fields):
+    for own in zip(*(path.fields(step) for step in range(len(path.states)))):
         made[f"displacement/{own[0].name}"] = np.array([f.displacement.T for f in own], dtype=np.float32)
-        made[f"stress/{own[0].name}"] = np.array([f.stress for f in own], dtype=np.float32)
         made[f"von_mises/{own[0].name}"] = np.array([f.von_mises for f in own], dtype=np.float32)
     return made
 

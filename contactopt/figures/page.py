@@ -3,8 +3,8 @@
 The page shows the bodies, which can be turned, enlarged, cut and coloured by stress or displacement; their deformation follows a
 slider. Half and quarter models are shown whole. On the contact surface it shows pressure, traction, gap, slip, and which contacts
 stick, slip or are open. A click on a place shows its values with their units. A load path has a slider over its states and the
-loop of force and displacement. The bodies move with it where all their states are small enough to be kept (MOST_NUMBERS in
-contactopt.figures.output).
+loop of force and displacement. The bodies move with it where the run wrote all of their states, which it does for a page if they are
+small enough (MOST_NUMBERS in contactopt.figures.output).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from contactopt.errors import InputError
-from contactopt.figures.html import check_installed, packed, write_html
+from contactopt.figures.html import check_installed, packed, packed_short, write_html
 from contactopt.figures.output import STATES
 from contactopt.figures.pieces import mesh_lines, outline, pieces, segments, sharp_edges, solids, surface, triangles
 
@@ -78,7 +78,7 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
     pairs = {name: meshes[f"contact-{name}"] for name in summary["pairs"]}
     axes = {"axisymmetric": ["r", "z"], "plane-strain": ["x", "y"]}.get(summary["kind"], ["x", "y", "z"])
     mirrors = [[axes.index(plane["axis"]), plane["place"]] for plane in summary["mirrors"]]
-    fields = {name: _body_values(name, mesh, moving) for name, mesh in bodies.items()}
+    fields = {name: _body_values(name, mesh, len(axes), moving) for name, mesh in bodies.items()}
     box = _whole(_box([mesh.points for mesh in (*bodies.values(), *pairs.values())]), mirrors)
     near = _near_contact(_whole(_box([mesh.points for mesh in pairs.values()]), mirrors), box)
     largest = max((float(np.abs(values["move"]).max()) for values in fields.values()), default=0.0)
@@ -89,7 +89,8 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
     contacts, first = [], 0
     for name, mesh in pairs.items():
         own = slice(first, first + len(mesh.points))
-        contacts.append({"name": name} | _contact(mesh, _motion(bodies, fields, mesh.points), interface, path, own))
+        move = _motion(bodies, fields, mesh.points, len(axes))
+        contacts.append({"name": name} | _contact(mesh, move, interface, path, own))
         first = own.stop
     stresses = [values["von_mises"].ravel() for values in fields.values()]
     return {
@@ -141,15 +142,13 @@ def _round(value: float) -> float:
     return float(power * max(m for m in (1, 2, 5) if m * power <= value * (1 + 1e-12)))
 
 
-def _body_values(name: str, mesh: Any, moving: dict[str, np.ndarray] | None) -> dict[str, np.ndarray]:
-    """Displacement `move` (s, n, 3), von Mises stress and stresses (s, n) of a body, at the last or at all s states."""
+def _body_values(name: str, mesh: Any, dim: int, moving: dict[str, np.ndarray] | None) -> dict[str, np.ndarray]:
+    """Displacement `move` (s, n, dim), von Mises stress (s, n) and stresses (1, n) of a body, at the last or at all s states."""
     data = mesh.point_data
-    parts = [key for key in data if key.startswith("stress_")]
+    values = {key: data[key][None] for key in data if key == "von_mises" or key.startswith("stress_")}
     if moving is None:
-        return {"move": data["displacement"][None]} | {key: data[key][None] for key in ("von_mises", *parts)}
-    move, stress = moving[f"displacement/{name}"], moving[f"stress/{name}"]
-    move = np.pad(move, ((0, 0), (0, 0), (0, 3 - move.shape[2])))
-    return {"move": move, "von_mises": moving[f"von_mises/{name}"]} | dict(zip(parts, np.moveaxis(stress, 2, 0)))
+        return {"move": data["displacement"][None, :, :dim]} | values
+    return values | {"move": moving[f"displacement/{name}"], "von_mises": moving[f"von_mises/{name}"]}
 
 
 def _body_arrays(mesh: Any, values: dict[str, np.ndarray], mirrors: list[list[Any]], inside: bool) -> dict[str, Any]:
@@ -169,10 +168,15 @@ def _body_arrays(mesh: Any, values: dict[str, np.ndarray], mirrors: list[list[An
     place[nodes] = np.arange(len(nodes))
     return {
         "points": packed(mesh.points[nodes]),
-        "values": {name: packed(value[:, nodes]) for name, value in values.items() if name != "move"},
-        "move": packed(values["move"][:, nodes]),
+        "values": {name: _packed(value[:, nodes]) for name, value in values.items() if name != "move"},
+        "move": _packed(values["move"][:, nodes]),
         **{name: packed(place[numbers]) for name, numbers in drawn.items()},
     }
+
+
+def _packed(values: np.ndarray) -> dict[str, Any]:
+    """Values (s, ...), those of several states in two bytes each."""
+    return packed(values) if len(values) == 1 else packed_short(values)
 
 
 def _apart(items: np.ndarray, points: np.ndarray, mirrors: list[list[Any]]) -> tuple[np.ndarray, np.ndarray]:
@@ -184,10 +188,12 @@ def _apart(items: np.ndarray, points: np.ndarray, mirrors: list[list[Any]]) -> t
     return items[~within], items[within]
 
 
-def _motion(bodies: dict[str, Any], fields: dict[str, dict[str, np.ndarray]], points: np.ndarray) -> np.ndarray:
-    """Displacements (s, k, 3) of places (k, 3): those of the nearest node of a body, none without bodies."""
+def _motion(
+    bodies: dict[str, Any], fields: dict[str, dict[str, np.ndarray]], points: np.ndarray, dim: int
+) -> np.ndarray:
+    """Displacements (s, k, dim) of places (k, 3): those of the nearest node of a body, none without bodies."""
     if not bodies:
-        return np.zeros((1, *points.shape))
+        return np.zeros((1, len(points), dim))
     nearest = KDTree(np.concatenate([mesh.points for mesh in bodies.values()])).query(points)[1]
     return np.asarray(np.concatenate([fields[name]["move"] for name in bodies], axis=1)[:, nearest])
 
@@ -195,11 +201,11 @@ def _motion(bodies: dict[str, Any], fields: dict[str, dict[str, np.ndarray]], po
 def _contact(
     mesh: Any, move: np.ndarray, interface: dict[str, np.ndarray], path: dict[str, np.ndarray] | None, own: slice
 ) -> dict[str, Any]:
-    """One pair of surfaces: places, displacements (s, k, 3), and values of every state."""
+    """One pair of surfaces: places, displacements (s, k, dim), and values of every state."""
     (block,) = mesh.cells
     return {
         "points": packed(mesh.points),
-        "move": packed(move),
+        "move": _packed(move),
         "cells": packed(triangles(block.data) if block.type != "line" else np.zeros((0, 3), dtype=int)),
         "place": packed(interface["x"][own].T),
         "states": {
@@ -269,10 +275,10 @@ def certificate_words(summary: dict[str, Any]) -> str:
 def _followers(data: dict[str, Any]) -> str:
     """Which parts of the page follow the slider over the states."""
     if data["moving"] or not data["bodies"]:
-        return "The whole page follows the slider. The slip is that since the state before."
+        return "The page follows the slider; single stresses inside the bodies are those of the last state. The slip is that since the state before."
     return (
         "The contact follows the slider: pressure, traction, status, gap, slip since the state before, and arrows. The bodies are "
-        "those of the last state, because all of their states would make the page too large."
+        "those of the last state: the run kept no others, because it made no page, or because they are too large for one."
     )
 
 

@@ -30,8 +30,8 @@ const bodyNames = bodies.length ? ["von_mises", "size", ...data.axes.map((axis) 
 
 function values(body, name, every = false) {  // at the nodes of a body, in the state shown or in every state
   if (body.values[name]) return every ? body.values[name] : at(body.values[name], count(body));
-  const move = every ? body.move : at(body.move, body.points.length), c = data.axes.indexOf(name.slice(5));
-  return Float32Array.from({length: move.length / 3}, (_, i) => (name === "size" ? Math.hypot(move[3 * i], move[3 * i + 1], move[3 * i + 2]) : move[3 * i + c]));
+  const dim = data.dim, move = every ? body.move : at(body.move, dim * count(body)), c = data.axes.indexOf(name.slice(5));
+  return Float32Array.from({length: move.length / dim}, (_, i) => (name === "size" ? Math.hypot(...move.subarray(dim * i, dim * i + dim)) : move[dim * i + c]));
 }
 
 // An image is the list of the planes at which it is mirrored; the first one is the model itself.
@@ -45,11 +45,11 @@ function sign(name, image) {  // by which a component changes in an image; those
 }
 
 function placed(item) {  // places of the nodes of all images shown, one image after the other
-  const length = count(item), move = at(item.move, 3 * length), all = shownImages(), xyz = [0, 1, 2].map(() => new Float32Array(length * all.length));
+  const length = count(item), dim = data.dim, move = at(item.move, dim * length), all = shownImages(), xyz = [0, 1, 2].map(() => new Float32Array(length * all.length));
   all.forEach((image, k) => {
     for (let c = 0; c < 3; c++) {
       const plane = image.find(([axis]) => axis === c), turn = plane ? -1 : 1, shift = plane ? 2 * plane[1] : 0;
-      for (let i = 0; i < length; i++) xyz[c][k * length + i] = shift + turn * (item.points[3 * i + c] + now.scale * move[3 * i + c]);
+      for (let i = 0; i < length; i++) xyz[c][k * length + i] = shift + turn * (item.points[3 * i + c] + (c < dim ? now.scale * move[dim * i + c] : 0));
     }
   });
   return xyz;
@@ -163,7 +163,7 @@ function bodyTraces() {
       intensity: shape.values, colorscale: "Viridis", cmin: now.field === "von_mises" ? 0 : low, cmax: top,
       showscale: index === 0, opacity: now.clear ? 0.3 : 1, hoverinfo: "none", meta: {body: bodies.indexOf(body), from: shape.from},
       lighting: flat ? {ambient: 1, diffuse: 0, specular: 0} : {ambient: 0.75, diffuse: 0.4, specular: 0},
-      colorbar: {orientation: "h", y: -0.02, yanchor: "top", thickness: 12, len: 0.9, title: {text: plain(label(now.field)), side: "top"}},
+      colorbar: {orientation: "h", y: -0.02, yanchor: "top", thickness: 12, len: 0.9, title: {text: plain(label(now.field) + (data.moving && now.field.startsWith("stress_") ? ", last state" : "")), side: "top"}},
     }];
     for (const [name, width, shade] of [["lines", 1, "rgba(0,0,0,0.35)"], ["edges", 2, "rgba(0,0,0,0.8)"]]) {
       if (!now[name]) continue;
@@ -204,7 +204,7 @@ function contactTraces() {
 
 function arrows(pair) {
   const xyz = placed(pair), length = count(pair), force = state(pair, "vector"), status = state(pair, "status"), every = pair.states.vector, all = shownImages();
-  const touching = [...status.keys()].filter((i) => status[i] > 0), step = Math.ceil((touching.length * all.length) / 400);
+  const touching = [...status.keys()].filter((i) => status[i] > 0), step = Math.ceil((touching.length * all.length) / (flat ? 30 : 400));
   let largest = 1e-300;
   for (let i = 0; i < every.length; i += 3) largest = Math.max(largest, Math.hypot(every[i], every[i + 1], every[i + 2]));
   const arrowLength = 0.15 * Math.max(...now.box[0].map((low, c) => now.box[1][c] - low));
@@ -223,7 +223,7 @@ function arrows(pair) {
   const common = {hoverinfo: "skip", showlegend: false, type: "scatter3d"};
   return [
     {...common, mode: "lines", x: made[0], y: made[1], z: made[2], line: {color: "#000", width: 3}},
-    {...common, mode: "markers", x: tips[0], y: tips[1], z: tips[2], marker: {size: flat ? 4 : 2.5, color: "#000"}},
+    {...common, mode: "markers", x: tips[0], y: tips[1], z: tips[2], marker: {size: 2.5, color: "#000"}},
   ];
 }
 
@@ -235,10 +235,11 @@ function probeTrace() {
     marker: {size: 8, color: "rgba(0,0,0,0)", line: {color: "#d00", width: 4}, symbol: "circle-open"}}];
 }
 
-const axis = (name) => ({title: {text: plain(`${name} [${LENGTH}]`)}, showbackground: false, zeroline: false, showspikes: false});
-const HOME = flat ? {eye: {x: 0, y: 0, z: 2.2}, up: {x: 0, y: 1, z: 0}, center: {x: 0, y: 0, z: 0}} : {eye: {x: -1.1, y: -1.5, z: 0.7}, up: {x: 0, y: 0, z: 1}, center: {x: 0, y: 0, z: 0}};
+const axis = (name) => ({title: {text: plain(`${name} [${LENGTH}]`)}, showbackground: false, zeroline: false, showspikes: false, nticks: flat ? 5 : 8, ...(flat ? {tickangle: 0} : {})});
+const HOME = flat ? {eye: {x: 0, y: -0.07, z: 2.2}, up: {x: 0, y: 1, z: 0}, center: {x: 0, y: -0.07, z: 0}} : {eye: {x: -1.1, y: -1.5, z: 0.7}, up: {x: 0, y: 0, z: 1}, center: {x: 0, y: 0, z: 0}};
 const MARGIN = 0.05;  // of the size of the box, about it
 const FRONT = flat ? 0.54 : 0.42;
+const ROUNDING = 1e-12;  // of the size of the bodies, below which a gap or a slip is what rounding leaves of zero
 const LIFT = 0.002;  // of the size of the box, by which lines stand off the surface
 
 function axesOfView() {  // unit vectors to the right and up in the first picture of solids
@@ -250,7 +251,7 @@ function boxed() {  // ranges of the axes, and the size of the picture: in a par
   const [low, high] = now.box, size = Math.max(...low.map((value, c) => high[c] - value)), rim = MARGIN * size, made = {"scene.aspectmode": "manual"};
   // One unit of the aspect ratio is about FRONT of the height between the colour bars.
   const height = view.clientHeight - 120, share = low.map((value, c) => (high[c] - value) / size + 2 * MARGIN);
-  const room = flat ? [0.8, 0.85] : [0.75, 0.78], [right, up] = flat ? [[1, 0, 0], [0, 1, 0]] : axesOfView();
+  const room = flat ? [0.72, 0.78] : [0.75, 0.78], [right, up] = flat ? [[1, 0, 0], [0, 1, 0]] : axesOfView();
   const [across, tallest] = [right, up].map((way) => share.reduce((sum, value, c) => sum + Math.abs(way[c]) * value, 0));
   const tall = Math.min(room[1] / tallest, (room[0] * view.clientWidth) / height / across) / FRONT;
   ["x", "y", "z"].forEach((name, c) => {
@@ -281,6 +282,8 @@ function draw() {
   Plotly.react(view, [...bodyTraces(), ...contactTraces(), ...probeTrace()], layout, config);
 }
 
+const rounded = (length) => (Math.abs(length) < ROUNDING * Math.max(...data.box[0].map((low, c) => data.box[1][c] - low)) ? 0 : length);
+
 function probe(place) {
   now.probe = place;
   const table = control("values");
@@ -295,7 +298,7 @@ function probe(place) {
   add(place.body === undefined ? "contact" : "node", `${i} of ${item.name}`, "");
   data.axes.forEach((name, c) => add(name, item.points[3 * i + c], LENGTH));
   if (place.body === undefined) {
-    for (const [name, [words, unit]] of Object.entries(CONTACT)) add(words, name === "status" ? STATUS[state(item, name)[i]] : state(item, name)[i], unit);
+    for (const [name, [words, unit]] of Object.entries(CONTACT)) add(words, name === "status" ? STATUS[state(item, name)[i]] : unit === LENGTH ? rounded(state(item, name)[i]) : state(item, name)[i], unit);
   } else {
     for (const name of bodyNames) {
       const words = label(name), end = words.lastIndexOf(" [");
