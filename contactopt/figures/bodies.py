@@ -39,7 +39,7 @@ def deformed(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], 
         ax = _draw_solid(scene, fields, scale, top, ax)
     else:
         ax = _draw_section(scene, fields, scale, top, ax, mirror_plane(scene, problem))
-    times = f", displacements x {scale:g}" if scale != 1 else ""
+    times = f"\ndisplacements x {scale:g}" if scale != 1 else ""
     ax.set_title(f"{scene.name}: deformed bodies, {scene.friction}{times}")
     return ax
 
@@ -65,7 +65,7 @@ def _draw_section(
 ) -> Any:
     from matplotlib.collections import LineCollection
 
-    ax = make_axes(ax)
+    ax, bar = (ax, None) if ax is not None else _placed_axes()
     axis, place = plane or (0, 0.0)
     for f in fields:
         points = f.mesh.p + scale * f.displacement
@@ -84,8 +84,17 @@ def _draw_section(
     reach = _reach(scene, fields)
     if reach is not None:
         ax.set(xlim=(-reach, reach), ylim=(-0.9 * reach, 0.6 * reach))
-    ax.figure.colorbar(colours, ax=ax, label=f"von Mises stress [{scene.units[1]}]", extend="max", shrink=0.8)
+    room = {"ax": ax, "shrink": 0.8} if bar is None else {"cax": bar}
+    ax.figure.colorbar(colours, label=f"von Mises stress [{scene.units[1]}]", extend="max", **room)
     return ax
+
+
+def _placed_axes() -> tuple[Any, Any]:
+    """Axes of a new figure and those of its colour bar, at fixed places: working out places takes as long as drawing."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.8))
+    return figure.add_axes((0.12, 0.11, 0.68, 0.77)), figure.add_axes((0.84, 0.19, 0.03, 0.65))
 
 
 def _reach(scene: Scene, fields: Sequence[Fields]) -> float | None:
