@@ -161,6 +161,16 @@ def test_the_certificate_in_words_tells_a_solution_from_an_iterate():
     assert certificate_words(stopped).startswith("This is not a solution, only the last iterate (it stalled).")
 
 
+def test_an_adaptive_run_shows_its_last_mesh_and_the_sizes_of_all(tmp_path):
+    result = run("sphere", tmp_path, accuracy=0.05, quantity="pressure", adaptive=True, figures=(), html=True)
+    text, data = (tmp_path / "view.html").read_text(), data_of(tmp_path / "view.html")
+    for fields, body in zip(result.fields, sorted(data["bodies"], key=lambda body: body["name"], reverse=True)):
+        assert fields.name == body["name"]
+        assert len(decoded(body["lines"])) == fields.mesh.nfacets  # every side of a triangle once
+    assert ", ".join(str(level.unknowns) for level in result.estimate.levels) in text
+    assert result.estimate.message in text
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 @pytest.mark.parametrize("name,width", [("path", 400)])
 def test_a_browser_shows_the_page_and_the_keyboard_turns_it(folder, name, width):
@@ -180,4 +190,34 @@ def test_a_browser_shows_the_page_and_the_keyboard_turns_it(folder, name, width)
                 "const s = document.getElementById('state'); s.focus(); s.value = 0; s.dispatchEvent(new Event('input'))"
             )
             assert browser.ask(words).startswith("state 1 of ")
+        assert not browser.faults
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+def test_bodies_move_with_the_slider_and_solids_are_cut_and_mirrored(folder):
+    moved = "JSON.stringify([...document.getElementById('view').data[0].y].slice(0, 50))"
+    with Browser(folder / "path" / "view.html", 1000) as browser:
+        browser.wait("document.querySelectorAll('#contact-chart .main-svg').length > 0")
+        last = browser.ask(moved)
+        browser.ask(
+            "(() => { const s = document.getElementById('state'); s.value = 0; s.dispatchEvent(new Event('input')); })()"
+        )
+        assert browser.ask(moved) != last and not browser.faults
+    drawn = "document.getElementById('view').data.filter((trace) => trace.type === 'mesh3d')"
+    reach = f"JSON.stringify({drawn}.slice(0, 2).map((t) => t.x.reduce((a, v) => [Math.min(a[0], v), Math.max(a[1], v)], [9, -9])))"
+    with Browser(folder / "solid" / "view.html", 1000) as browser:
+        browser.wait("document.querySelectorAll('#contact-chart .main-svg').length > 0")
+        (low, high), *_ = json.loads(browser.ask(reach))
+        assert low == pytest.approx(-high)
+        browser.ask("document.getElementById('whole').click()")
+        assert json.loads(browser.ask(reach))[0][0] > -1e-6
+        browser.ask("document.getElementById('whole').click()")
+        low, high = (corner[0] for corner in data_of(folder / "solid" / "view.html")["box"])
+        browser.ask(
+            "(() => { for (const [id, value, event] of [['cut', '0', 'change'], ['cut-place', '0.5', 'input']])"
+            " { const c = document.getElementById(id); c.value = value; c.dispatchEvent(new Event(event)); } })()"
+        )
+        used = f"(() => {{ const t = {drawn}[0]; return Math.min(...[...t.i].map((n) => t.x[n])); }})()"
+        assert browser.ask(used) >= (low + high) / 2 - 1e-3 * (high - low)
+        assert "from x = " in browser.ask("document.getElementById('cut-words').innerText")
         assert not browser.faults

@@ -295,6 +295,10 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
         "largest pressure": f"{summary['max_pressure']:.5g} {stress}",
     }
     rows |= {words: f"{summary[key]:.5g} {length}" for key, words in WORDS.items() if summary.get(key) is not None}
+    if found := summary.get("accuracy"):
+        error = "unknown" if found["error"] is None else f"{found['error']:.1e}"
+        rows[f"accuracy of the {found['quantity']}"] = f"{error}, asked for {found['target']:g}: {found['message']}"
+        rows["unknowns of the meshes"] = ", ".join(str(level["unknowns"]) for level in found["levels"])
     cells = "".join(
         f'<tr><th scope="row">{html.escape(str(name))}</th><td>{html.escape(str(value))}</td></tr>'
         for name, value in rows.items()
