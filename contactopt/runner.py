@@ -16,7 +16,7 @@ from contactopt.analysis.accuracy import Estimate, refine
 from contactopt.analysis.paths import PathResult, solve_states
 from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
 from contactopt.analysis.resolution import remarks
-from contactopt.analysis.resultants import tables
+from contactopt.analysis.resultants import mirrors, tables
 from contactopt.analysis.solve_scene import Options, Solved
 from contactopt.bodies.ranks import Team, spread
 from contactopt.cards import card, count, line
@@ -106,7 +106,7 @@ class Result:
         if file is None:
             file = Path(tempfile.mkdtemp(prefix="contactopt-")) / PAGE
         with tempfile.TemporaryDirectory() as folder:
-            write(self, Path(folder))
+            write(self, Path(folder), states=True)
             (Path(folder) / "summary.json").write_text(json.dumps(self.summary))
             made = write_page(folder, file)
         if show:
@@ -257,7 +257,7 @@ def _finish(
             with _clock(seconds, "figures"):
                 draw(made, folder, formats)
         with _clock(seconds, "files"):
-            write(made, folder)
+            write(made, folder, states="html" in files)
         made = replace(made, summary=summary | _seconds(seconds, start))
         (folder / "summary.json").write_text(json.dumps(made.summary, indent=2) + "\n")
         if "html" in files:
@@ -386,6 +386,7 @@ def _summary(
         "scene": reduction.scene.name,
         "kind": reduction.scene.kind,
         "units": list(reduction.scene.units),
+        "mirrors": mirrors(reduction),
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
         "mu": float(problem.mu.max(initial=0.0)),

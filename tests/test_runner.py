@@ -14,6 +14,7 @@ KEYS = [
     "scene",
     "kind",
     "units",
+    "mirrors",
     "dofs",
     "contact_nodes",
     "mu",

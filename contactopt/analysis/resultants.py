@@ -13,6 +13,8 @@ from contactopt.interface.charts import SymmetryPlane
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution, alone
 
+ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and still lie along it
+
 
 @dataclass(frozen=True, eq=False)
 class Resultant:
@@ -83,6 +85,32 @@ def planes_of(reduction: Reduction) -> tuple[SymmetryPlane, ...]:
         if not any(abs(plane.inward @ other.inward) > 0.5 for other in found):
             found.append(plane)
     return tuple(found)
+
+
+def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
+    """Find the planes beyond which mirror images make the bodies whole.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene.
+
+    Returns
+    -------
+    list of dict
+        {"axis": name of a coordinate, "place": [length]} for every plane. The axis of revolution counts as one in its
+        section. The list is empty where the bodies are whole, and where a plane does not lie across an axis.
+    """
+    scene = reduction.scene
+    if scene.kind == "axisymmetric":
+        return [{"axis": scene.components[0], "place": 0.0}]
+    made = []
+    for plane in planes_of(reduction):
+        axis = int(np.argmax(np.abs(plane.inward)))
+        if abs(plane.inward[axis]) < 1 - ALONG:
+            return []
+        made.append({"axis": scene.components[axis], "place": float(plane.offset / plane.inward[axis]) + 0.0})
+    return made if 2 ** len(made) == scene.copies else []
 
 
 def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:

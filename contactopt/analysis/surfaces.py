@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from contactopt.analysis.resultants import space_forces
 from contactopt.analysis.status import contact_status
+from contactopt.bodies.elements import facet_nodes
 from contactopt.interface.recovery import Fields
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution
@@ -124,13 +125,12 @@ def on_nodes(
     default = {part.name: part.contact for part in reduction.scene.parts if isinstance(part, Part)}
     made = []
     for body in fields:
-        data = {name: np.zeros((body.mesh.nvertices, *value.shape[1:])) for name, value in surfaces[0].data.items()}
+        data = {name: np.zeros((body.mesh.p.shape[1], *value.shape[1:])) for name, value in surfaces[0].data.items()}
         for pair, surface, coupling in zip(reduction.scene.pairs, surfaces, reduction.couplings):
             for side, (name, boundary) in enumerate(zip(pair.bodies, pair.surfaces)):
                 if name != body.name:
                     continue
-                facets = body.mesh.boundaries[boundary or default[name]]
-                nodes = np.unique(body.mesh.facets[:, facets])
+                nodes = facet_nodes(body.mesh, body.mesh.boundaries[boundary or default[name]])
                 tree = KDTree(surface.points.T)
                 spacing = tree.query(surface.points.T, k=min(2, len(surface.gap)))[0].reshape(len(surface.gap), -1)
                 apart, nearest = tree.query(body.mesh.p[:, nodes].T)

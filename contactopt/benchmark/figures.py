@@ -17,6 +17,7 @@ from contactopt.benchmark.style import (
     FLOOR,
     LEAST_RESIDUAL,
     NAMES,
+    WIDTH,
     add_legend,
     label_ends,
     make_figure,
@@ -151,7 +152,7 @@ def performance_profile(
         xscale="log",
         xlim=(1, largest),
         ylim=(0, 1.03),
-        xlabel=f"ratio: {what} / that of the best method on the instance [-]",
+        xlabel=f"ratio: {what} / the best method's [-]",
     )
     ax.set_ylabel(f"share of the {len(wide)} instances solved")
     return add_legend(figure, ax, "method (solved)")
@@ -252,8 +253,8 @@ def stability_map(
     from matplotlib.colors import LogNorm, Normalize
 
     parts = groups(table, by)
-    columns = min(4, len(parts))
-    figure, axes = make_figure(columns, -(-len(parts) // columns), size=(3.0, 2.9) if len(parts) > 1 else (6.4, 3.6))
+    columns = min(2, len(parts))
+    figure, axes = make_figure(columns, -(-len(parts) // columns), (WIDTH / columns, 2.5 if columns > 1 else 3.8))
     grids = [(name, rows, _grid(rows, x, y, value)) for name, rows in parts]
     shown = np.concatenate([grid.to_numpy(float).ravel() for _, _, grid in grids])
     shown = shown[np.isfinite(shown) & (shown > 0)]
@@ -262,7 +263,7 @@ def stability_map(
     for number, (ax, (name, rows, grid)) in enumerate(zip(np.ravel(axes), grids)):
         ax.set_facecolor("#cccccc")
         ax.patch.set(hatch="xx", edgecolor="#999999")
-        write_numbers(ax, grid, norm)
+        write_numbers(ax, grid, norm, 7 if columns > 1 else 8)
         mesh = ax.imshow(grid.to_numpy(float), norm=norm, cmap="viridis", origin="lower", aspect="auto")
         ax.set_title(name, fontsize=9)
         ax.set_xlabel(NAMES.get(x, x), fontsize=8 if len(parts) > 1 else None)
@@ -277,9 +278,9 @@ def stability_map(
         ax.set_axis_off()
     handles = {line.get_label(): line for ax in np.ravel(axes) for line in ax.get_lines()}
     if handles:
-        figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=2, frameon=False, fontsize=8)
+        figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=1, frameon=False, fontsize=8)
     label = "share of runs solved" if value == "success" else NAMES.get(value, value) + ", median"
-    figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
+    figure.colorbar(mesh, ax=axes, label=label, location="top", shrink=0.8, aspect=30)
     return figure
 
 

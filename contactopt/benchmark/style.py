@@ -15,10 +15,13 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 MARKERS = "osD^vP*X<>hpd8H1"  # one for each of 16 methods; colours come back after eight, with other lines
 FLOOR = 1e-2  # residuals below this fraction of the tolerance asked for are drawn there: they answer no question
 LEAST_RESIDUAL = 1e-17  # drawn in place of 0
-NEAR_X, NEAR_Y = 60.0, 11.0  # pixels between labels that would run into each other
+WIDE, TALL = 5.4, 11.0  # pixels of a character of a label, and between labels one above the other
 POINTS = 0.72  # of a pixel at the usual resolution of a figure
+SHORT = 20  # characters of a label, up to which three of them fit side by side below a figure
 LONGEST = 26  # characters of a label
 MOST_ROUNDS = 20  # of sixteen methods in one figure
+WIDTH = 5.6  # of a figure [inch], so that its letters can be read where it is 400 pixels wide
+ROW = 0.19  # of a legend [inch]
 CELLS = 240  # of a map, above which no numbers are written into them
 NAMES = {
     "solve_seconds": "time of the method [s]",
@@ -89,6 +92,8 @@ def short_label(name: str, labels: Mapping[str, str] = MappingProxyType({})) -> 
 def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
     """Write the names of lines in their colours beside their last points, one above the other where they meet.
 
+    A name stands to the left of a point in the right half of the figure, to the right of any other.
+
     Parameters
     ----------
     ax
@@ -97,17 +102,20 @@ def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
         (x, y, name, colour) of each line.
     """
     ax.autoscale_view()
-    taken: list[tuple[float, float]] = []  # places of labels in pixels
+    middle = float(ax.transAxes.transform((0.5, 0.5))[0])
+    taken: list[tuple[float, float, float]] = []  # left and right end and height of labels in pixels
     for x, y, name, colour in sorted(ends, key=lambda end: end[1]):
         across, up = (float(place) for place in ax.transData.transform((x, y)))
-        shift = 3.0
-        while any(abs(across - other) < NEAR_X and abs(up + shift - height) < NEAR_Y for other, height in taken):
-            shift += NEAR_Y
-        taken.append((across, up + shift))
-        ax.annotate(name, (x, y), (5, shift * POINTS), textcoords="offset points", color=colour, fontsize=7)
+        left = across - WIDE * len(name) if across > middle else across
+        right, shift = left + WIDE * len(name), 3.0
+        while any(left < end and start < right and abs(up + shift - height) < TALL for start, end, height in taken):
+            shift += TALL
+        taken.append((left, right, up + shift))
+        side = {"ha": "right", "xytext": (-5, shift * POINTS)} if across > middle else {"xytext": (5, shift * POINTS)}
+        ax.annotate(name, (x, y), textcoords="offset points", color=colour, fontsize=7, **side)
 
 
-def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any) -> None:
+def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:
     """Write the numbers of a map in its cells, black on light colours and white on dark ones.
 
     Parameters
@@ -118,6 +126,8 @@ def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any) -> None:
         The numbers, row by row.
     norm
         What takes a number to its place between the darkest and the lightest colour.
+    size
+        Of the letters [pt].
     """
     values = grid.to_numpy(float)
     if values.size > CELLS:
@@ -126,10 +136,10 @@ def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any) -> None:
         if np.isfinite(value):
             colour = "black" if float(norm(max(value, norm.vmin))) > 0.6 else "white"
             text = short_tick(float(f"{value:.0f}" if 10 <= abs(value) < 1000 else f"{value:.1g}"))
-            ax.text(column, row, text, ha="center", va="center", fontsize=6, color=colour)
+            ax.text(column, row, text, ha="center", va="center", fontsize=size, color=colour)
 
 
-def make_figure(columns: int = 1, rows: int = 1, size: Sequence[float] = (7.6, 4.4)) -> tuple[Any, Any]:
+def make_figure(columns: int = 1, rows: int = 1, size: Sequence[float] = (WIDTH, 4.0)) -> tuple[Any, Any]:
     """Make a figure with axes.
 
     Parameters
@@ -168,7 +178,7 @@ def set_ticks(axis: Any) -> None:
 
 
 def add_legend(figure: Any, ax: Any, title: str | None = None) -> Any:
-    """Add a grid, and a legend beside the figure.
+    """Add a grid, and a legend below the figure, which grows for it.
 
     Parameters
     ----------
@@ -185,8 +195,17 @@ def add_legend(figure: Any, ax: Any, title: str | None = None) -> Any:
     ax.grid(alpha=0.3)
     handles, labels = ax.get_legend_handles_labels()
     if handles:
+        columns = 2 if max(len(label) for label in labels) > SHORT else 3
+        figure.set_figheight(figure.get_figheight() + ROW * (-(-len(labels) // columns) + (title is not None)))
         figure.legend(
-            handles, labels, loc="outside right upper", frameon=False, fontsize=8, title=title, title_fontsize=8
+            handles,
+            labels,
+            loc="outside lower center",
+            ncols=columns,
+            frameon=False,
+            fontsize=8,
+            title=title,
+            title_fontsize=8,
         )
     return figure
 

@@ -37,6 +37,7 @@ SHAPES = {
     "RefTet": (skfem.MeshTet, {1: skfem.ElementTetP1, 2: skfem.ElementTetP2}),
     "RefHex": (skfem.MeshHex, {1: skfem.ElementHex1, 2: skfem.ElementHex2}),
 }
+CURVED = {"RefTri": skfem.MeshTri2, "RefQuad": skfem.MeshQuad2, "RefTet": skfem.MeshTet2, "RefHex": skfem.MeshHex2}
 _LINE = RefLine, skfem.ElementLineP1(), np.array([[0.0, 1.0, 0.5]])
 _TRIANGLE = RefTri, skfem.ElementTriP1(), np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]])
 _SQUARE = (
@@ -198,6 +199,34 @@ def straight(mesh: skfem.Mesh) -> skfem.Mesh:
         return mesh
     plain = SHAPES[mesh.refdom.__name__][0](np.ascontiguousarray(mesh.p[:, : mesh.nvertices]), mesh.t)
     return plain.with_boundaries(mesh.boundaries) if mesh.boundaries else plain
+
+
+def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
+    """The mesh with the places (dim, n) of all nodes of a quadratic displacement, the vertices first; boundaries keep their names."""
+    if is_curved(mesh):
+        return mesh
+    made = CURVED[mesh.refdom.__name__](places, mesh.t)
+    return made.with_boundaries(mesh.boundaries) if mesh.boundaries else made
+
+
+def facet_nodes(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
+    """Find all nodes of a mesh on some of its facets, those in the middle of edges and faces included.
+
+    Parameters
+    ----------
+    mesh
+        A mesh of first or second order.
+    facets : (f,)
+        Indices of facets.
+
+    Returns
+    -------
+    (n,) array
+        Indices of nodes, without repetition.
+    """
+    if not is_curved(mesh):
+        return np.unique(mesh.facets[:, facets])
+    return np.unique(mesh.dofs.get_facet_dofs(facets).flatten())
 
 
 def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:

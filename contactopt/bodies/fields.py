@@ -11,7 +11,7 @@ import numpy as np
 import skfem
 
 from contactopt.bodies.body import Assembly
-from contactopt.bodies.elements import SHAPES, straight, weight_at
+from contactopt.bodies.elements import SHAPES, second_order, straight, weight_at
 from contactopt.material import lame
 
 STRESSES = {
@@ -20,12 +20,15 @@ STRESSES = {
     "solid": ("xx", "yy", "zz", "xy", "yz", "xz"),
 }
 PLACES = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
+BLOCK = 2000  # elements whose shape functions are evaluated at a time, which bounds the memory that they take
 
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """One body after the solve, at the n vertices of its mesh.
+    """One body after the solve, at the n nodes of its mesh, of which the vertices come first.
 
+    mesh         of scikit-fem, with the places of all nodes in `mesh.p`: of second order where the displacement is quadratic,
+                 with nodes in the middle of edges, quadrilaterals and hexahedra
     displacement (dim, n) [length];  stress (n, 4 or 6) [stress], components named in `names`;  von_mises (n,)
     contact      name -> (n,) or (n, 3) contact quantities at the nodes, if they were asked for
     """
@@ -40,6 +43,9 @@ class Fields:
 
     def write_vtu(self, path: Path) -> None:
         """Write the body as a VTU file with displacement, stress, von Mises stress and contact quantities at the nodes.
+
+        Cells of second order are quadratic triangles and tetrahedra, biquadratic quadrilaterals and triquadratic hexahedra of VTK
+        (22, 24, 28 and 29).
 
         Parameters
         ----------
@@ -77,30 +83,37 @@ def fields_of(body: Assembly, U: np.ndarray) -> Fields:
     mean = np.trace(stress) / 3
     deviator = stress - mean * np.eye(3)[:, :, None]
     von_mises = np.sqrt(1.5 * np.sum(deviator**2, axis=(0, 1)))
-    return Fields(body.name, straight(basis.mesh), STRESSES[body.kind], U[basis.nodal_dofs], full, von_mises)
+    mesh = straight(basis.mesh) if body.degree == 1 else second_order(basis.mesh, body.locations)
+    return Fields(body.name, mesh, STRESSES[body.kind], U[body.unknowns], full, von_mises)
 
 
-def nodal_stress(body: Assembly, U: np.ndarray) -> np.ndarray:
-    """Stress tensor (3, 3, n) at the vertices of the mesh, averaged over the elements with their volumes.
+def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.ndarray:
+    """Stress tensor (3, 3, n) at the nodes of a body, averaged over the elements with their volumes.
 
-    An element counts with its mean stress where the displacement is linear, with its stress at the vertex where it is
+    An element counts with its mean stress where the displacement is linear, with its stress at the node where it is
     quadratic. Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
+
+    everywhere  whether at all nodes of a quadratic displacement, or at the vertices of the mesh alone
     """
     basis, mesh = body.basis, body.basis.mesh
     volume = basis.dx.sum(axis=1)
+    shape = SHAPES[mesh.refdom.__name__][1][body.degree if everywhere else 1]()
     if body.degree == 1:
         element = np.sum(stress_in(body, basis, U) * basis.dx, axis=3) / volume
         values = np.repeat(element[..., None], len(mesh.t), axis=3)
     else:
-        corners = SHAPES[mesh.refdom.__name__][1][1].doflocs.T
-        places = skfem.Basis(mesh, basis.elem, quadrature=(corners, np.ones(corners.shape[1])))
-        values = stress_in(body, places, U)
-    vertices, count = mesh.t.T.ravel(), int(mesh.nvertices)
-    weight = np.bincount(vertices, np.repeat(volume, len(mesh.t)), count)
+        places = shape.doflocs.T
+        blocks = np.array_split(np.arange(mesh.nelements), -(-mesh.nelements // BLOCK))
+        rule = places, np.ones(places.shape[1])
+        bases = (skfem.Basis(mesh, basis.elem, elements=block, quadrature=rule) for block in blocks)
+        values = np.concatenate([stress_in(body, at, U) for at in bases], axis=2)
+    nodes = skfem.Dofs(mesh, shape).element_dofs  # numbered as the nodes are
+    where, count = nodes.T.ravel(), int(nodes.max()) + 1
+    weight = np.bincount(where, np.repeat(volume, len(nodes)), count)
     total = np.zeros((3, 3, count))
     for i in range(3):
         for j in range(3):
-            total[i, j] = np.bincount(vertices, (values[i, j] * volume[:, None]).ravel(), count)
+            total[i, j] = np.bincount(where, (values[i, j] * volume[:, None]).ravel(), count)
     return total / weight
 
 
@@ -129,14 +142,13 @@ def recovery_error(body: Assembly, U: np.ndarray, W: np.ndarray) -> np.ndarray:
     basis, mesh = body.basis, straight(body.basis.mesh)
     shape = SHAPES[mesh.refdom.__name__][1][1]()
     vertices = skfem.Basis(mesh, shape, quadrature=(basis.X, basis.W))
-    first, second = (
-        sum(
-            nodal_stress(body, field)[:, :, mesh.t[i]][..., None] * np.asarray(vertices.basis[i][0])
-            for i in range(len(mesh.t))
-        )
-        - stress_in(body, basis, field)
-        for field in (U, W)
-    )
+
+    def missed(field: np.ndarray) -> np.ndarray:
+        averaged = nodal_stress(body, field, everywhere=False)[:, :, mesh.t]
+        continuous = sum(averaged[:, :, i, :, None] * np.asarray(vertices.basis[i][0]) for i in range(len(mesh.t)))
+        return np.asarray(continuous - stress_in(body, basis, field))
+
+    first, second = missed(U), missed(W)
     E, nu = body.material.E, body.material.nu
     traces = np.trace(first) * np.trace(second)
     density = ((1 + nu) * np.sum(first * second, axis=(0, 1)) - nu * traces) / E

@@ -24,6 +24,8 @@ from contactopt.files import whole_file
 POLICY = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:"
 KINDS = {"f": ("f4", "<f4"), "i": ("i4", "<i4"), "u": ("i4", "<i4"), "b": ("i4", "<i4")}
 
+SHORT = 65535  # the largest number of two bytes
+
 
 def check_installed() -> None:
     """Raise InputError unless plotly is installed, of which the pages hold a copy."""
@@ -48,6 +50,15 @@ def packed(array: Any) -> dict[str, Any]:
     name, kind = KINDS[array.dtype.kind]
     data = np.ascontiguousarray(array.astype(kind))
     return {"type": name, "shape": list(array.shape), "data": base64.b64encode(data.tobytes()).decode()}
+
+
+def packed_short(array: np.ndarray) -> dict[str, Any]:
+    """An array for the data of a page: numbers of two bytes each, which divide the range of the array into 65535 steps."""
+    low, high = float(array.min(initial=np.inf)), float(array.max(initial=-np.inf))
+    step = (high - low) / SHORT if high > low else 1.0
+    data = np.ascontiguousarray(np.rint((array - low) / step).astype("<u2"))
+    text = base64.b64encode(data.tobytes()).decode()
+    return {"type": "u2", "shape": list(array.shape), "low": low, "step": step, "data": text}
 
 
 def write_html(file: str | Path, title: str, body: str, data: Mapping[str, Any], programs: Sequence[str]) -> Path:

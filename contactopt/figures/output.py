@@ -17,14 +17,18 @@ from contactopt.problem import alone, part_of
 from contactopt.scenes.scene import HalfSpace
 
 if TYPE_CHECKING:
+    from contactopt.analysis.paths import PathResult
+    from contactopt.interface.recovery import Fields
     from contactopt.runner import Result
 
 PAGE = "view.html"
 PICTURES = ("deformed", "maps", "pressure", "path")
+STATES = "states.npz"
+MOST_NUMBERS = 3_000_000  # of the bodies at all states of a load path, above which only the last state is written
 # What a run writes beside summary.json and one VTU file per body.
 RUN_FILES = (
     *(f"{name}.{ending}" for name in PICTURES for ending in FORMATS),
-    PAGE, "interface.npz", "history.csv", "path.npz",
+    PAGE, "interface.npz", "history.csv", "path.npz", STATES,
 )  # fmt: skip
 
 
@@ -79,7 +83,7 @@ def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
         save(path_figure(result.path), "path")
 
 
-def write(result: Result, folder: Path) -> None:
+def write(result: Result, folder: Path, states: bool) -> None:
     """Write the fields of a result as VTU files, its contact forces and its load path as arrays.
 
     Parameters
@@ -88,6 +92,8 @@ def write(result: Result, folder: Path) -> None:
         The solved scene.
     folder
         Where the files go.
+    states
+        Whether to write the bodies at all states of the path, too, for a page on which they move.
     """
     surfaces = contact_fields(result.reduction, result.solution)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
@@ -113,6 +119,23 @@ def write(result: Result, folder: Path) -> None:
     )
     if result.path is not None:
         result.path.write(folder)
+        if states and (found := body_states(result.path, result.fields)):
+            np.savez(folder / STATES, **found)
+
+
+def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
+    """The bodies at the n states of a path, by "QUANTITY/BODY": displacement (n, nodes, dim) and von_mises (n, nodes).
+
+    It is empty where there would be more than MOST_NUMBERS, or where the path kept no displacements.
+    """
+    numbers = len(path.states) * sum(own.displacement.size + own.von_mises.size for own in last)
+    if not path.states[-1].bodies or not 0 < numbers <= MOST_NUMBERS:
+        return {}
+    made = {}
+    for own in zip(*(path.fields(step) for step in range(len(path.states)))):
+        made[f"displacement/{own[0].name}"] = np.array([f.displacement.T for f in own], dtype=np.float32)
+        made[f"von_mises/{own[0].name}"] = np.array([f.von_mises for f in own], dtype=np.float32)
+    return made
 
 
 def earlier_files(folder: Path) -> set[str]:

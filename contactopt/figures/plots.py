@@ -117,7 +117,7 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
         ylabel=f"p / mean p [-], mean p = {mean:.4g} {scene.units[1]}",
         ylim=(0, 5.0 if singular(scene) else 1.15 * float((p / mean).max() or 1.0)),
     )
-    ax.legend(frameon=False)
+    ax.legend(edgecolor="none")
     return ax
 
 
@@ -163,9 +163,10 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
         ax.plot(x[slipping], t[slipping], "s", color=ORANGE, ms=5, mfc="white", label="slip")
     name, where = _place_label(scene, problem), ", y = 0" if problem.dim == 3 else ""
     ax.set(
-        xlabel=f"{name} [{scene.units[0]}]{where}", ylabel=f"tangential traction on the upper body [{scene.units[1]}]"
+        xlabel=f"{name} [{scene.units[0]}]{where}",
+        ylabel=f"tangential traction\non the upper body [{scene.units[1]}]",
     )
-    ax.legend(frameon=False)
+    ax.legend(edgecolor="none")
     return ax
 
 
@@ -213,7 +214,9 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
 
 
 def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) -> Any:
-    """Draw pressure and tangential traction side by side, with the map of stick and slip in 3D.
+    """Draw pressure above tangential traction, with the map of stick and slip in 3D.
+
+    One panel stands above the other, so that all of them can be read where the figure is 400 pixels wide.
 
     Parameters
     ----------
@@ -231,10 +234,10 @@ def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) 
 
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
     # Two plain panels have fixed places, because working out places takes as long as drawing.
-    figure = Figure(figsize=(5.4 * len(panels), 4.2), layout="constrained" if problem.dim == 3 else None)
+    figure = Figure(figsize=(5.6, 3.6 * len(panels)), layout="constrained" if problem.dim == 3 else None)
     if problem.dim == 2:
-        figure.subplots_adjust(left=0.065, right=0.985, bottom=0.13, top=0.91, wspace=0.23)
-    for draw, ax in zip(panels, figure.subplots(1, len(panels))):
+        figure.subplots_adjust(left=0.19, right=0.97, bottom=0.07, top=0.94, hspace=0.24)
+    for draw, ax in zip(panels, figure.subplots(len(panels), 1)):
         draw(scene, problem, solution, ax)
     figure.suptitle(f"{scene.name}, {scene.friction}: {solution.status}, residual {solution.residual:.1e}")
     return figure
