@@ -72,7 +72,11 @@ def make_parser() -> argparse.ArgumentParser:
     show.add_argument(
         "--set", metavar="NAME=VALUE", action="append", default=[], help="give an argument of the scene another value"
     )
-    simple = add("simplify", "say what may be left out of a scene, why, and which error that makes", commands.simplify)
+    simple = add(
+        "simplify",
+        "say what may be left out of a scene, why it may be left out, and which error that makes",
+        commands.simplify,
+    )
     simple.add_argument("scene", metavar="SCENE", help="a scene file (.toml), or " + ", ".join(SCENES))
     simple.add_argument(
         "--set", metavar="NAME=VALUE", action="append", default=[], help="give an argument of the scene another value"
@@ -80,7 +84,7 @@ def make_parser() -> argparse.ArgumentParser:
     simple.add_argument(
         "--no-solve",
         action="store_true",
-        help="look only for what makes no error, which needs no solution of the scene",
+        help="look only for what makes no error; then the scene need not be solved",
     )
     new = add("new", "write an example of a scene file, to start from", commands.new)
     new.add_argument(
@@ -171,7 +175,7 @@ def _run(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--simplest",
         action="store_true",
-        help="first leave out all that can be left out without an error, as contactopt simplify says",
+        help="first leave out all that makes no error; `contactopt simplify SCENE` says what this is",
     )
     run.add_argument("--ranks", type=int, metavar="N", help="number of processes that share the bodies (needs mpi4py)")
     run.add_argument(
