@@ -13,3 +13,5 @@ ALONG = 2.0  # resistance of `laplacian` to tangential waves along their own dir
 SOFT = 0.28  # share by which bilinear elements lower the compliance of the shortest tangential waves along their own direction
 CELL = 0.45  # power of a node's cell that weights it on a surface: 1/2 where the spacing varies slowly
 EDGE = 0.2  # power of the share of the cell that an edge leaves: 0 for a half-space, 1/4 and more for a quarter-space
+WAVES = 3.0  # length of a pair of surfaces over its distance to the next pair that is worth one more degree of smooth forces
+MOST_WAVES = 12  # the highest degree
