@@ -17,8 +17,9 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
 from contactopt.solving.constants import LOOSE
 from contactopt.solving.kernels.bonded import SOFTEST, Bonded
-from contactopt.solving.kernels.krylov import krylov_step, model_of
+from contactopt.solving.kernels.krylov import krylov_step
 from contactopt.solving.kernels.semismooth import RIDGE, Equations
+from contactopt.solving.preconditioners import Preconditioner
 
 FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-4  # accuracy of an iterative step: the first, and the bounds of the others
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
@@ -38,9 +39,17 @@ def forcing(residual: float, last: float) -> float:
     return min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2))
 
 
-def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = None, weight: float = 0.0) -> Equations:
-    """The Alart-Curnier equations of a problem, rho_i = 1 over the mean compliance of contact i."""
-    compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1) + weight
+def coulomb_equations(
+    problem: InterfaceProblem,
+    center: np.ndarray | None = None,
+    weight: float = 0.0,
+    stiffer: np.ndarray | float = 1.0,
+) -> Equations:
+    """The Alart-Curnier equations of a problem, rho_i = 1 over the mean compliance of contact i.
+
+    stiffer  (k,) by what the compliance that Newton's steps should see is smaller than the diagonal of Q
+    """
+    compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1) / stiffer + weight
     return Equations(
         problem.Q,
         problem.q,
@@ -70,9 +79,8 @@ def bonded_factor(problem: InterfaceProblem) -> Bonded | None:
         return None
 
 
-def krylov(problem: InterfaceProblem, preconditioner: str | None) -> tuple[Step, Step]:
+def krylov(P: Preconditioner) -> tuple[Step, Step]:
     """Newton's steps from products with Q, and those of the bonded solution: the same."""
-    P = model_of(problem, preconditioner)
 
     def step(equations, error, balance, D, rtol):  # type: ignore[no-untyped-def]
         return krylov_step(equations, P, error, balance, D, rtol)

@@ -49,10 +49,20 @@ class Preconditioner(LinearOperator):
 
     model   G = P^-1 by cheap products, None where there is no such thing
     blocks  the unknowns of each pair of surfaces; P couples none of them with each other, and each has a scale of its own
+    factors (n,) by what deflation multiplied P: how much stiffer the contacts are than the diagonal of Q says, once smooth
+            motions are taken out of it
     """
 
-    def __init__(self, n: int, product: GridMap, model: GridMap | None = None, blocks: Sequence[slice] = ()):
+    def __init__(
+        self,
+        n: int,
+        product: GridMap,
+        model: GridMap | None = None,
+        blocks: Sequence[slice] = (),
+        factors: np.ndarray | None = None,
+    ):
         super().__init__(np.dtype(float), (n, n))
+        self.factors = np.ones(n) if factors is None else factors
         self.product, self.blocks = product, tuple(blocks) or (slice(0, n),)
         self.model = None if model is None else LinearOperator((n, n), matvec=model, rmatvec=model, dtype=float)
 
@@ -219,14 +229,14 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
 
     model = P.model
     if model is None:
-        return Preconditioner(len(Z), apply, blocks=P.blocks)
+        return Preconditioner(len(Z), apply, None, P.blocks, c)
     GZ = np.stack([model @ z for z in Z.T], axis=1) / c[:, None]
     B = np.linalg.inv(Z.T @ GZ)
 
     def inverse(x: np.ndarray) -> np.ndarray:
         return np.asarray(model @ x / c - GZ @ (B @ (GZ.T @ x)) + QZ @ (QZ.T @ x))
 
-    return Preconditioner(len(Z), apply, inverse, P.blocks)
+    return Preconditioner(len(Z), apply, inverse, P.blocks, c)
 
 
 def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
