@@ -62,6 +62,17 @@ def coulomb_equations(
     )
 
 
+def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Forces within the bounds of the law to the last digit, at the solution equal to r (k, dim): P(y) = r + error.
+
+    Thin bodies between several pairs of surfaces are much softer under smooth forces than 1 / rho. There P(y), which contains rho u,
+    would make a displacement of the rounding of u, and r itself is projected on the bounds instead.
+    """
+    if len(problem.pairs) == 1:
+        return r + error
+    return problem.law.nearest(r, np.maximum(r[:, 0], problem.law.lowest))
+
+
 def definite(Q: sp.csr_array) -> bool:
     """Whether a sparse symmetric Q is safely positive definite, as that of elastic bodies without redundant contacts."""
     try:

@@ -27,6 +27,7 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import InterfaceOperator, loosened
 from contactopt.solving.kernels.alart_curnier import (
     FIRST,
+    admissible,
     cold_start,
     coulomb_equations,
     dense,
@@ -91,10 +92,9 @@ class Newton:
         if self.linear == "dense" or (isinstance(problem.Q, InterfaceOperator) and not implicit):
             problem = problem.explicit()
         equations = coulomb_equations(problem)
-        thin = implicit and len(problem.pairs) > 1
         if implicit:
             P = model_of(problem, self.preconditioner)
-            if thin:
+            if len(problem.pairs) > 1:
                 equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
             step, first = krylov(P)
         else:
@@ -105,10 +105,7 @@ class Newton:
             aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
             sharp = replace(equations, Q=loosened(problem.Q, SHARP * aim))
             residual, error, balance, D = sharp.evaluate(r, multipliers)
-            # Equal at the solution, and both within the bounds to the last digit. P(y) = r + error contains rho u, whose
-            # rounding is all that is left where thin bodies between pairs of surfaces are much softer than 1 / rho.
-            within = problem.law.nearest(r, np.maximum(r[:, 0], problem.law.lowest)) if thin else r + error
-            yield (within, multipliers), residual
+            yield (admissible(problem, r, error) if implicit else r + error, multipliers), residual
             rtol = forcing(residual, last)
             change = step(sharp, error, balance, D, rtol)
             if change is None:
