@@ -17,8 +17,9 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
 from contactopt.solving.constants import KRYLOV_FIRST, KRYLOV_LOOSEST, KRYLOV_TIGHTEST, LOOSE
 from contactopt.solving.kernels.bonded import LEAST_PIVOT, Bonded
-from contactopt.solving.kernels.krylov import krylov_step, model_of
+from contactopt.solving.kernels.krylov import krylov_step
 from contactopt.solving.kernels.semismooth import RIDGE, Equations
+from contactopt.solving.preconditioners import Preconditioner
 
 FIRST = KRYLOV_FIRST  # also of the bonded solution
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
@@ -52,7 +53,12 @@ def forcing(residual: float, last: float) -> float:
     return min(KRYLOV_LOOSEST, max(KRYLOV_TIGHTEST, 0.5 * (residual / last) ** 2))
 
 
-def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = None, weight: float = 0.0) -> Equations:
+def coulomb_equations(
+    problem: InterfaceProblem,
+    center: np.ndarray | None = None,
+    weight: float = 0.0,
+    stiffer: np.ndarray | float = 1.0,
+) -> Equations:
     """Write the Alart-Curnier equations of a problem, with rho_i = 1 over the mean compliance of contact i.
 
     Source: Alart, Curnier (1991), A mixed formulation for frictional contact problems prone to Newton like solution
@@ -66,13 +72,15 @@ def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = Non
         (k, dim) forces of a proximal term, if there is one.
     weight
         The weight of the proximal term, a compliance.
+    stiffer
+        By what the compliance that Newton's steps should see is smaller than the diagonal of Q, (k,) or one number.
 
     Returns
     -------
     Equations
         The equations, which can be evaluated and solved for a Newton step.
     """
-    compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1) + weight
+    compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1) / stiffer + weight
     return Equations(
         problem.Q,
         problem.q,
@@ -83,6 +91,17 @@ def coulomb_equations(problem: InterfaceProblem, center: np.ndarray | None = Non
         center,
         weight,
     )
+
+
+def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Forces within the bounds of the law to the last digit, at the solution equal to r (k, dim): P(y) = r + error.
+
+    Thin bodies between several pairs of surfaces are much softer under smooth forces than 1 / rho. There P(y), which contains rho u,
+    would make a displacement of the rounding of u, and r itself is projected on the bounds instead.
+    """
+    if len(problem.pairs) == 1:
+        return r + error
+    return problem.law.nearest(r, np.maximum(r[:, 0], problem.law.lowest))
 
 
 def definite(Q: sp.csr_array) -> bool:
@@ -114,22 +133,19 @@ def _bonded_factor(problem: InterfaceProblem) -> Bonded | None:
         return None
 
 
-def krylov(problem: InterfaceProblem, preconditioner: str | None) -> tuple[Step, Step]:
+def krylov(P: Preconditioner) -> tuple[Step, Step]:
     """Make Newton's steps from products with Q, and those of the bonded solution, which are the same.
 
     Parameters
     ----------
-    problem
-        A dimensionless interface problem.
-    preconditioner
-        A name, as for `model_of`.
+    P
+        The preconditioner of the steps.
 
     Returns
     -------
     tuple
         Two functions (equations, error, balance, D, rtol) -> step.
     """
-    P = model_of(problem, preconditioner)
 
     def step(equations, error, balance, D, rtol):  # type: ignore[no-untyped-def]
         return krylov_step(equations, P, error, balance, D, rtol)

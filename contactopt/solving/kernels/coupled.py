@@ -36,7 +36,12 @@ from contactopt.solving.constants import (
     SCHUR_STEP,
 )
 from contactopt.solving.deadline import check_time
-from contactopt.solving.kernels.alart_curnier import coulomb_equations, glued_contacts, glued_projection
+from contactopt.solving.kernels.alart_curnier import (
+    admissible,
+    coulomb_equations,
+    glued_contacts,
+    glued_projection,
+)
 from contactopt.solving.kernels.flexible import flexible_gmres
 from contactopt.solving.kernels.krylov import model_of
 from contactopt.solving.kernels.linearised import Linearised
@@ -108,7 +113,7 @@ class Coupled:
         return State(at.X + X, at.r + r.reshape(at.r.shape), at.multipliers + multipliers)
 
     def judged(self, at: State, error: np.ndarray) -> Known:
-        """The forces P(y) = r + error, at the solution equal to r and within the bounds to the last digit, with Q P(y).
+        """The forces r + error, at the solution equal to r and within the bounds to the last digit, with what Q makes of them.
 
         One V-cycle improves the displacements. The accuracy stated is that before it, by the criterion with which
         conjugate gradients end: the energy (f'Bf)^1/2 of the missing forces f over that of the displacements.
@@ -148,15 +153,18 @@ def coupled_steps(
         An iterate, and the residual of the equations that its step began with. The iteration ends where a step fails.
     """
     with one_blas_thread():
-        P = fitted(model_of(problem, preconditioner, deflate=False), form)
-        coupled = Coupled(coulomb_equations(problem), form, P)
+        several = len(problem.pairs) > 1
+        P = model_of(problem, preconditioner, deflate=several)
+        equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
+        coupled = Coupled(equations, form, P if several else fitted(P, form))
         at = _bonded(problem, coupled) if start is None else State(in_equilibrium(form, start[0]), *start)
     last = np.inf
     while at is not None:
         with one_blas_thread():
             right, linearised = coupled.linearised(at)
             residual = coupled.size(right)
-            known = coupled.judged(at, _parted(right)[1].reshape(at.r.shape))
+            error = _parted(right)[1].reshape(at.r.shape)
+            known = coupled.judged(at, admissible(problem, at.r, error) - at.r)
         yield known, residual
         rtol = (
             min(COUPLED_LOOSEST, max(COUPLED_TIGHTEST, 0.5 * (residual / last) ** 2))

@@ -27,6 +27,7 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import InterfaceOperator, loosened
 from contactopt.solving.kernels.alart_curnier import (
     FIRST,
+    admissible,
     cold_start,
     coulomb_equations,
     dense,
@@ -35,6 +36,7 @@ from contactopt.solving.kernels.alart_curnier import (
     sparse,
 )
 from contactopt.solving.kernels.coupled import coupled_steps
+from contactopt.solving.kernels.krylov import model_of
 from contactopt.solving.methods import NATIVE, Iterate, Known
 from contactopt.solving.notes import note
 from contactopt.solving.preconditioners import find_preconditioner
@@ -107,7 +109,10 @@ class Newton:
             problem = problem.explicit()
         equations = coulomb_equations(problem)
         if implicit:
-            step, first = krylov(problem, self.preconditioner)
+            P = model_of(problem, self.preconditioner)
+            if len(problem.pairs) > 1:
+                equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
+            step, first = krylov(P)
         else:
             step, first = sparse(problem) if sp.issparse(problem.Q) else dense(problem)
         r, multipliers = cold_start(problem, first) if start is None else start
@@ -116,8 +121,7 @@ class Newton:
             aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
             sharp = replace(equations, Q=loosened(problem.Q, SHARP * aim))
             residual, error, balance, D = sharp.evaluate(r, multipliers)
-            # P(y): at the solution equal to r, and within the bounds to the last digit
-            yield (r + error, multipliers), residual
+            yield (admissible(problem, r, error) if implicit else r + error, multipliers), residual
             rtol = forcing(residual, last)
             change = step(sharp, error, balance, D, rtol)
             if change is None:

@@ -23,27 +23,47 @@ so that (G_AA)^-1, by an inner PCG that needs no body, has the condition number 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
+from numpy.polynomial.chebyshev import chebvander
 from scipy.sparse.linalg import LinearOperator, cg
+from scipy.spatial import KDTree
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, part_of
 from contactopt.problem.operators import Interface, diagonal, held
+from contactopt.solving.preconditioners.constants import MOST_WAVES, WAVES
 from contactopt.solving.preconditioners.grid import GridMap
 
 ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an active set
+DEPENDENT = 1e-10  # share of a smooth motion's energy, apart from that of others, below which it is one of them
+LEFT = 1e-6  # share of a random force's work below which deflation leaves nothing to scale by
 
 
 class Preconditioner(LinearOperator):
-    """P (n, n), an approximate inverse of Q; model: G = P^-1 by cheap products, None where there is no such thing."""
+    """P (n, n), an approximate inverse of Q.
 
-    def __init__(self, n: int, product: GridMap, model: GridMap | None = None):
+    model   G = P^-1 by cheap products, None where there is no such thing
+    blocks  the unknowns of each pair of surfaces; P couples none of them with each other, and each has a scale of its own
+    factors (n,) by what deflation multiplied P: how much stiffer the contacts are than the diagonal of Q says, once smooth
+            motions are taken out of it
+    """
+
+    def __init__(
+        self,
+        n: int,
+        product: GridMap,
+        model: GridMap | None = None,
+        blocks: Sequence[slice] = (),
+        factors: np.ndarray | None = None,
+    ):
         super().__init__(np.dtype(float), (n, n))
-        self.product = product
+        self.factors = np.ones(n) if factors is None else factors
+        self.product, self.blocks = product, tuple(blocks) or (slice(0, n),)
         self.model = None if model is None else LinearOperator((n, n), matvec=model, rmatvec=model, dtype=float)
 
     def _matvec(self, x: np.ndarray) -> np.ndarray:
@@ -146,11 +166,15 @@ def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Precondit
     def model(x: np.ndarray) -> np.ndarray:
         return np.concatenate([part @ x[own] for part, own in zip(models, rows)])
 
-    return Preconditioner(problem.q.size, product, model if len(models) == len(parts) else None)
+    return Preconditioner(problem.q.size, product, model if len(models) == len(parts) else None, rows)
 
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
-    """Write the constant and linear motions of every pair of surfaces as columns.
+    """Write smooth forces on every pair of surfaces as columns: polynomials of the place, in every component.
+
+    On a pair that is far from all others they are constant and linear. Forces whose waves are longer than the distance to the
+    next pair reach it through the body in between, which no model of one pair knows. A thin slice of a body bends
+    under them as a plate does. Therefore the degree grows with the length of a pair over that distance.
 
     Parameters
     ----------
@@ -160,36 +184,59 @@ def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
     Returns
     -------
     ndarray
-        (k dim, j) motions.
+        (k dim, j) forces.
     """
-    parts = [_smooth_motions(part_of(problem, pair)) for pair in problem.pairs]
+    parts = [_smooth_motions(part_of(problem, pair), degree) for pair, degree in zip(problem.pairs, degrees(problem))]
     return np.asarray(la.block_diag(*parts))
 
 
-def _smooth_motions(problem: InterfaceProblem) -> np.ndarray:
-    """(k dim, j <= dim^2): constant and linear functions of the place in every component: translations, tilts, stretches.
+def degrees(problem: InterfaceProblem) -> list[int]:
+    """The degree of the smooth forces on each pair of surfaces.
 
-    On a closed line, which has no linear functions, the first cosine and sine take their place. Components that cannot move
-    stay at rest; what is then no motion of its own is left out.
+    The distance between two pairs is the median over the contacts of one of them, so that pairs that meet at a corner are
+    not taken for neighbours along all of their length.
+    """
+    points = [problem.coordinates[:, pair.contacts].T for pair in problem.pairs]
+    trees = [KDTree(own) for own in points]
+    found = []
+    for own, tree in zip(points, trees):
+        apart = min((float(np.median(other.query(own)[0])) for other in trees if other is not tree), default=np.inf)
+        length = float(np.linalg.norm(np.ptp(own, axis=0)))
+        found.append(int(np.clip(length / (WAVES * apart) if apart > 0 else MOST_WAVES, 1, MOST_WAVES)))
+    return found
+
+
+def _smooth_motions(problem: InterfaceProblem, degree: int) -> np.ndarray:
+    """(k dim, j): polynomials of the place up to a degree, those of Chebyshev, in every component.
+
+    On a closed line, which has no polynomials, cosines and sines take their place. Components that cannot move carry no force;
+    what is then no force of its own is left out.
     """
     chart = problem.chart
-    place = chart.places - chart.places.mean(axis=1, keepdims=True)
     if chart.period is not None:
-        angle = 2 * np.pi * chart.places[0] / chart.period
-        place = np.stack([np.cos(angle), np.sin(angle)])
-    functions = [np.ones(problem.contacts), *(x / (np.abs(x).max() or 1.0) for x in place)]
+        angle = 2 * np.pi * np.outer(np.arange(degree + 1), chart.places[0]) / chart.period
+        functions = [*np.cos(angle), *np.sin(angle[1:])]
+    else:
+        low, length = chart.places.min(axis=1), np.ptp(chart.places, axis=1)
+        place = (chart.places - low[:, None]) / np.where(length > 0, length, 1.0)[:, None]
+        waves = [chebvander(2 * x - 1, degree).T for x in place]
+        powers: list[tuple[int, ...]] = [(i,) for i in range(degree + 1)]
+        if len(waves) == 2:
+            powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
+        functions = [np.prod([wave[i] for wave, i in zip(waves, power)], axis=0) for power in powers]
     Z = np.concatenate([np.kron(f[:, None], np.eye(problem.dim)) for f in functions], axis=1)
     Z[held(problem.Q)] = 0.0
     _, R = np.linalg.qr(Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300))
-    return Z[:, np.abs(np.diag(R)) > 1e-3]
+    return Z[:, np.flatnonzero(np.abs(np.diag(R)) > 1e-3)]
 
 
 def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
-    """Make a preconditioner exact on some columns: c (I - Z A^-1 Z'Q) P (I - Q Z A^-1 Z') + Z A^-1 Z' with A = Z'QZ.
+    """Make a preconditioner exact on some columns: (I - Z Z'Q) c P (I - Q Z Z') + Z Z', with Z'QZ = I.
 
-    The factor c puts the eigenvalues of P Q about 1, where those of the exact part are. It needs j + 1 products with Q
-    once; each application adds O(n j). Its inverse is the block secant update of P^-1 = G, G/c - G/c Z (Z'G/c Z)^-1
-    Z'G/c + QZ A^-1 (QZ)'.
+    The columns are made orthonormal in the energy first. The factors c, one for each block of P, put the mean eigenvalue
+    of P Q on what is not exact about 1, where those of the exact part are. It needs j products with Q once, and another
+    one for each block; each application adds O(n j). Its inverse is the block secant update of P^-1 = G,
+    G/c - G/c Z (Z'G/c Z)^-1 Z'G/c + QZ (QZ)'.
 
     Sources: Mandel (1993), Balancing domain decomposition; Schnabel (1983), Quasi-Newton methods using multiple secant
     equations.
@@ -208,25 +255,54 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
     Preconditioner
         The preconditioner, with the model that belongs to it.
     """
-    QZ = np.asarray(Q @ Z)
-    A = Z.T @ QZ
-    A = np.linalg.inv((A + A.T) / 2)
-    x = np.random.default_rng(0).normal(size=len(Z))
-    x -= Z @ (A @ (QZ.T @ x))
-    Qx = np.asarray(Q @ x)
-    c = float(x @ Qx) / float(Qx @ (P @ Qx))
+    Z, QZ = _orthonormal(Z, np.asarray(Q @ Z))
+    c = _scales(P, Q, QZ)
 
     def apply(x: np.ndarray) -> np.ndarray:
-        coarse = A @ (Z.T @ x)
+        coarse = Z.T @ x
         y = c * (P @ (x - QZ @ coarse))
-        return np.asarray(y - Z @ (A @ (QZ.T @ y)) + Z @ coarse)
+        return np.asarray(y + Z @ (coarse - QZ.T @ y))
 
     model = P.model
     if model is None:
-        return Preconditioner(len(Z), apply)
-    GZ = np.stack([model @ z for z in Z.T], axis=1) / c
+        return Preconditioner(len(Z), apply, None, P.blocks, c)
+    GZ = np.stack([model @ z for z in Z.T], axis=1) / c[:, None]
     B = np.linalg.inv(Z.T @ GZ)
-    return Preconditioner(len(Z), apply, lambda x: model @ x / c - GZ @ (B @ (GZ.T @ x)) + QZ @ (A @ (QZ.T @ x)))
+
+    def inverse(x: np.ndarray) -> np.ndarray:
+        return np.asarray(model @ x / c - GZ @ (B @ (GZ.T @ x)) + QZ @ (QZ.T @ x))
+
+    return Preconditioner(len(Z), apply, inverse, P.blocks, c)
+
+
+def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Z (n, j) with Z'QZ = I on the same columns, but for what rounding makes of those that depend on others, and QZ."""
+    size = np.sqrt(np.maximum(np.einsum("ij,ij->j", Z, QZ), 1e-300))
+    values, vectors = np.linalg.eigh((Z.T @ QZ / size).T / size)
+    kept = values > DEPENDENT
+    change = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
+    return Z @ change, QZ @ change
+
+
+def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
+    """The factor (n,) of every block of P, the same for all of its unknowns.
+
+    A random force x = P y of one block does the work y'P y by the model. Its work by Q is x'Q x, less what the exact
+    part does of it, |QZ'x|^2.
+    """
+    random = np.where(held(Q), 0.0, np.random.default_rng(0).normal(size=len(QZ)))
+    made = P @ random
+    X = np.zeros((len(QZ), len(P.blocks)))
+    for i, own in enumerate(P.blocks):
+        X[own, i] = made[own]
+    X[held(Q)] = 0.0
+    whole = np.einsum("ij,ij->j", X, np.asarray(Q @ X))
+    rest = whole - np.sum((QZ.T @ X) ** 2, axis=0)
+    c = np.ones(len(QZ))
+    for i, own in enumerate(P.blocks):
+        work = rest[i] if rest[i] > LEFT * whole[i] else whole[i]
+        c[own] = float(random[own] @ made[own]) / work if work > 0 else 1.0
+    return c
 
 
 def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> LinearOperator:

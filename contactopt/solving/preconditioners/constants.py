@@ -20,3 +20,5 @@ EIGENVECTORS = 1200  # unknowns of a surface up to which `laplacian` takes its i
 PIECE = 0.25  # shift over the least eigenvalue of a piece of the surface that is as long as this one
 THINNEST = 1e-2  # nodal area over mass, relative to the mean, of a contact on an axis
 DISTORTED = 2.0  # area of a cell in the chart over that in space, or one over it, beyond which the chart has no directions there
+WAVES = 3.0  # length of a pair of surfaces over its distance to the next pair that is worth one more degree of smooth forces
+MOST_WAVES = 12  # the highest degree
