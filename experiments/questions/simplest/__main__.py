@@ -38,7 +38,8 @@ all its meshes together.
 the scene says; the other errors are measured against the whole scene on its own mesh. Simplifications of one scene follow each
 other, so that the last exact one contains those above it. Half-spaces are measured against the largest nodal pressure of the whole
 scene, whose own mesh makes most of that difference; the last table has fine meshes. The pressure of the pillar is infinite at its
-edge, and so a number of the mesh alone. `search` is the processor time of `simplify`, with its coarse solves.
+edge, and so a number of the mesh alone. `search` is the processor time of `simplify`, with its coarse solves: more
+than one solve of a small scene. It pays where a scene is refined, or solved more than once.
 
 {{found}}
 
