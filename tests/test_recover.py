@@ -6,8 +6,9 @@ import pytest
 from conftest import two_blocks
 
 from contactopt import reduce_bodies, run, scenes, solve
+from contactopt.bodies.elements import elements_of
 from contactopt.bodies.local_refinement import simplices
-from contactopt.figures.pieces import elements_of, outline
+from contactopt.figures.pieces import outline
 from contactopt.interface.recovery import recover
 
 

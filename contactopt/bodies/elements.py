@@ -38,6 +38,14 @@ SHAPES = {
     "RefHex": (skfem.MeshHex, {1: skfem.ElementHex1, 2: skfem.ElementHex2}),
 }
 CURVED = {"RefTri": skfem.MeshTri2, "RefQuad": skfem.MeshQuad2, "RefTet": skfem.MeshTet2, "RefHex": skfem.MeshHex2}
+CELLS = {  # what meshio and VTK call the elements, by whether they are of second order
+    "RefTri": ("triangle", "triangle6"), "RefQuad": ("quad", "quad9"),
+    "RefTet": ("tetra", "tetra10"), "RefHex": ("hexahedron", "hexahedron27"),
+}  # fmt: skip
+# nodes of a hexahedron of scikit-fem in the order of VTK: corners, edges, faces, centre
+HEXAHEDRON = (
+    0, 3, 6, 2, 1, 5, 7, 4, 10, 16, 14, 9, 12, 18, 17, 11, 8, 15, 19, 13, 20, 25, 22, 23, 21, 24, 26,
+)  # fmt: skip
 _LINE = RefLine, skfem.ElementLineP1(), np.array([[0.0, 1.0, 0.5]])
 _TRIANGLE = RefTri, skfem.ElementTriP1(), np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]])
 _SQUARE = (
@@ -155,6 +163,14 @@ def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
         return mesh
     made = CURVED[mesh.refdom.__name__](places, mesh.t)
     return made.with_boundaries(mesh.boundaries) if mesh.boundaries else made
+
+
+def elements_of(mesh: skfem.Mesh) -> tuple[str, np.ndarray]:
+    """The elements of a mesh: their name, a value of CELLS, and their nodes (e, v) in the order of VTK."""
+    nodes = np.asarray(mesh.dofs.element_dofs)
+    if mesh.refdom.__name__ == "RefHex":
+        nodes = nodes[list(HEXAHEDRON[: len(nodes)])]
+    return CELLS[mesh.refdom.__name__][is_curved(mesh)], nodes.T
 
 
 def facet_nodes(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
