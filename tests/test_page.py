@@ -193,6 +193,7 @@ def test_a_browser_shows_the_page_and_the_keyboard_turns_it(folder, name, width)
         assert not browser.faults
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_bodies_move_with_the_slider_and_solids_are_cut_and_mirrored(folder):
     moved = "JSON.stringify([...document.getElementById('view').data[0].y].slice(0, 50))"

@@ -6,8 +6,9 @@ import pytest
 from conftest import two_blocks
 
 from contactopt import reduce_bodies, run, scenes, solve
+from contactopt.bodies.elements import elements_of
 from contactopt.bodies.local_refinement import simplices
-from contactopt.figures.pieces import elements_of, outline
+from contactopt.figures.pieces import outline
 from contactopt.interface.recovery import recover
 
 
@@ -114,6 +115,9 @@ def test_a_quadratic_displacement_is_kept_at_every_node(kind, cut, name, tmp_pat
         places = back.points[block.data[:, list(among)]].mean(axis=1)
         assert np.allclose(back.points[block.data[:, corners + number]], places)
     assert np.allclose(back.point_data["displacement"][:, :dim].T, moved)
+    if cut:
+        sides = back.points[block.data[:, 1 : dim + 1], :dim] - back.points[block.data[:, :1], :dim]
+        assert np.linalg.det(sides).min() > 0
 
 
 def test_nodes_in_the_middle_of_curved_edges_lie_on_the_circle():

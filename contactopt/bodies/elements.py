@@ -38,6 +38,16 @@ SHAPES = {
     "RefHex": (skfem.MeshHex, {1: skfem.ElementHex1, 2: skfem.ElementHex2}),
 }
 CURVED = {"RefTri": skfem.MeshTri2, "RefQuad": skfem.MeshQuad2, "RefTet": skfem.MeshTet2, "RefHex": skfem.MeshHex2}
+CELLS = {  # what meshio and VTK call the elements, by whether they are of second order
+    "RefTri": ("triangle", "triangle6"), "RefQuad": ("quad", "quad9"),
+    "RefTet": ("tetra", "tetra10"), "RefHex": ("hexahedron", "hexahedron27"),
+}  # fmt: skip
+# nodes of a hexahedron of scikit-fem in the order of VTK: corners, edges, faces, centre
+HEXAHEDRON = (
+    0, 3, 6, 2, 1, 5, 7, 4, 10, 16, 14, 9, 12, 18, 17, 11, 8, 15, 19, 13, 20, 25, 22, 23, 21, 24, 26,
+)  # fmt: skip
+# nodes of a simplex numbered the other way round
+TURNED = {"RefTri": (0, 2, 1, 5, 4, 3), "RefTet": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8)}
 _LINE = RefLine, skfem.ElementLineP1(), np.array([[0.0, 1.0, 0.5]])
 _TRIANGLE = RefTri, skfem.ElementTriP1(), np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]])
 _SQUARE = (
@@ -207,6 +217,21 @@ def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
         return mesh
     made = CURVED[mesh.refdom.__name__](places, mesh.t)
     return made.with_boundaries(mesh.boundaries) if mesh.boundaries else made
+
+
+def elements_of(mesh: skfem.Mesh) -> tuple[str, np.ndarray]:
+    """The elements of a mesh: their name, a value of CELLS, and their nodes (e, v) in the order of VTK.
+
+    scikit-fem sorts the corners of simplices; here they are numbered so that volumes are positive.
+    """
+    nodes = np.array(mesh.dofs.element_dofs)
+    if mesh.refdom.__name__ == "RefHex":
+        nodes = nodes[list(HEXAHEDRON[: len(nodes)])]
+    elif mesh.refdom.__name__ in TURNED:
+        sides = mesh.p[:, nodes[1 : len(mesh.p) + 1]] - mesh.p[:, nodes[:1]]
+        negative = np.linalg.det(sides.transpose(2, 1, 0)) < 0
+        nodes[:, negative] = nodes[list(TURNED[mesh.refdom.__name__][: len(nodes)])][:, negative]
+    return CELLS[mesh.refdom.__name__][is_curved(mesh)], nodes.T
 
 
 def facet_nodes(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:

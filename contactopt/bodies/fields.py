@@ -11,8 +11,9 @@ import numpy as np
 import skfem
 
 from contactopt.bodies.body import Assembly
-from contactopt.bodies.elements import SHAPES, second_order, straight, weight_at
+from contactopt.bodies.elements import SHAPES, elements_of, second_order, straight, weight_at
 from contactopt.material import lame
+from contactopt.vtu import write_vtu
 
 STRESSES = {
     "plane-strain": ("xx", "yy", "zz", "xy"),
@@ -52,14 +53,10 @@ class Fields:
         path
             The file.
         """
-        from skfem.io.meshio import to_meshio
-
         flat = {f"stress_{name}": column for name, column in zip(self.names, self.stress.T)}
         vectors = np.pad(self.displacement, ((0, 3 - len(self.displacement)), (0, 0))).T
         data = {"displacement": vectors, "von_mises": self.von_mises, **flat, **self.contact}
-        mesh = to_meshio(self.mesh, point_data=data, encode_cell_data=False, encode_point_data=False)
-        mesh.points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
-        mesh.write(path, file_format="vtu")
+        write_vtu(path, self.mesh.p.T, *elements_of(self.mesh), data)
 
 
 def fields_of(body: Assembly, U: np.ndarray) -> Fields:

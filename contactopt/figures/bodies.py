@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.figures.pieces import elements_of, mesh_lines, outline, pieces, segments, surface, triangles
+from contactopt.bodies.elements import elements_of
+from contactopt.figures.pieces import mesh_lines, outline, pieces, segments, surface, triangles
 from contactopt.figures.solids import View, draw_frame, picture
 from contactopt.figures.style import make_axes
 from contactopt.interface.recovery import Fields

@@ -6,8 +6,6 @@ its nodes, and its edges as lines through the nodes in their middles.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 # nodes of the faces of a solid element, each face numbered as a plane element, seen from outside
@@ -147,11 +145,3 @@ def _alone(corners: np.ndarray) -> np.ndarray:
     """Rows of `corners` (m, c) that no other row repeats, in whatever order."""
     _, first, count = np.unique(np.sort(corners, axis=1), axis=0, return_index=True, return_counts=True)
     return np.sort(first[count == 1])
-
-
-def elements_of(mesh: Any) -> tuple[str, np.ndarray]:
-    """The elements of a mesh of scikit-fem: their name and nodes (e, v) in meshio."""
-    from skfem.io.meshio import to_meshio
-
-    (block,) = to_meshio(mesh, encode_cell_data=False).cells
-    return str(block.type), np.asarray(block.data)

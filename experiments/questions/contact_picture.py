@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from contactopt import scenes
 from contactopt.analysis.paths import PathResult, follow
-from contactopt.figures.pieces import elements_of, outline, pieces, triangles
+from contactopt.bodies.elements import elements_of
+from contactopt.figures.pieces import outline, pieces, triangles
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
 from contactopt.interface.recovery import recover
 from experiments.report import REPORTS
