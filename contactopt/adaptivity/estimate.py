@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from contactopt.analysis.places import StressReading
 from contactopt.analysis.solve_scene import Solved
 from contactopt.derivatives.outputs import seeds_of
 from contactopt.derivatives.states import Duals, Step
@@ -20,10 +21,14 @@ class ElementErrors:
 
     value      of the quantity [its unit]
     bodies     for each body what its elements add (elements,), signed [unit of the quantity]; (0,) for a body without a mesh
+    energy     estimated error of the displacement in the energy norm, over the norm of the displacement [-]
+    stress     where the quantity is a stress: the reading of it
     """
 
     value: float
     bodies: tuple[np.ndarray, ...]
+    energy: float
+    stress: StressReading | None = None
 
     @property
     def total(self) -> float:
@@ -60,12 +65,15 @@ def element_errors(solved: Solved, quantity: str) -> ElementErrors:
     """
     step = Step(solved.reduction, solved.reduction.problem, solved.solution)
     seeds = seeds_of(quantity, step)
+    own = tuple(body.recovery_error(U, U) for body, U in zip(solved.reduction.bodies, step.displaced))
+    energy = sum(body.energy(U) for body, U in zip(solved.reduction.bodies, step.displaced))
+    missing = sum(part.sum() for part in own) / 2
+    norm = float(np.sqrt(missing / energy)) if energy > 0 else 0.0
     if quantity == ENERGY:
-        fields, factor = step.displaced, 0.5
-    else:
-        dual = step.sensitivity.adjoint(
-            reactions=seeds.reactions, multipliers=seeds.multipliers, displacements=seeds.displacements
-        )
-        fields, factor = Duals(step, dual, seeds.bodies).fields, 1.0
-    bodies = zip(solved.reduction.bodies, step.displaced, fields)
-    return ElementErrors(seeds.value, tuple(factor * body.recovery_error(U, W) for body, U, W in bodies))
+        return ElementErrors(seeds.value, tuple(part / 2 for part in own), norm)
+    dual = step.sensitivity.adjoint(
+        reactions=seeds.reactions, multipliers=seeds.multipliers, displacements=seeds.displacements
+    )
+    bodies = zip(solved.reduction.bodies, step.displaced, Duals(step, dual, seeds.bodies).fields)
+    errors = tuple(body.recovery_error(U, W) for body, U, W in bodies)
+    return ElementErrors(seeds.value, errors, norm, seeds.stress)

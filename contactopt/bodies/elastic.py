@@ -29,6 +29,7 @@ from contactopt.bodies.body import Assembly, build_body, reload_body
 from contactopt.bodies.elements import face_nodes
 from contactopt.bodies.fields import Fields, fields_of, recovery_error
 from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
+from contactopt.bodies.recovery import Region, StressMap, stress_map
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.errors import InputError
@@ -208,6 +209,9 @@ class ElasticBody:
 
     def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
         return recovery_error(self.body, U, W)
+
+    def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap:
+        return stress_map(self.body, region, by_poisson)
 
     def loaded(self, scene: Scene, part: Part) -> ElasticBody:
         return _at_rest(self, reload_body(self.body, scene, part))

@@ -24,6 +24,7 @@ log = logging.getLogger(__name__)
 Curve = Callable[[np.ndarray], np.ndarray]
 NEAREST = 16  # old facets among which the one that holds a new facet is looked for
 FLAT = 0.1  # least share of its volume that an element keeps where its nodes move to a curved boundary
+ROUND = 1e-5  # distance of nodes from a circle, over its radius, within which they lie on it: files round their numbers
 CORNER = np.deg2rad(30)  # turn of a polygon between two edges from which on it is a corner of the body
 
 
@@ -101,10 +102,12 @@ def _outside(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.asarray(beyond + height / np.sqrt(np.trace(gram, axis1=2, axis2=3)))
 
 
-def boundary_curve(mesh: Any, name: str) -> Curve | None:
+def boundary_curve(mesh: Any, name: str, arcs: bool = False) -> Curve | None:
     """The smooth line through the nodes of a plane boundary, by arc length; None in space and for straight boundaries.
 
-    Where the boundary turns by more than CORNER it has a corner, and the pieces between corners are smooth by themselves.
+    Where the boundary turns by more than CORNER it has a corner, and the pieces between corners are smooth by themselves. A
+    piece whose nodes lie on a circle is an arc of that circle. With `arcs` every piece has to be an arc or straight, else the
+    boundary is taken for the polygon that it is, and the result is None.
     """
     if mesh.p.shape[0] != 2:
         return None
@@ -114,7 +117,7 @@ def boundary_curve(mesh: Any, name: str) -> Curve | None:
         points, middle = mesh.doflocs, mesh.dofs.facet_dofs[0, facets]
         edges = np.concatenate([[edges[0], middle], [middle, edges[1]]], axis=1)
     pieces = [_Piece(points[:, chain]) for chain in _chains(edges, points)]
-    if all(piece.flat for piece in pieces):
+    if all(piece.flat for piece in pieces) or (arcs and not all(piece.flat or piece.circle for piece in pieces)):
         return None
 
     def curve(points: np.ndarray) -> np.ndarray:
@@ -135,6 +138,7 @@ class _Piece:
         self.flat = nodes.shape[1] < 3 or bool(np.all(np.abs(turns) < 1e-9))
         closed = nodes.shape[1] > 3 and np.array_equal(nodes[:, 0], nodes[:, -1])
         self.line = CubicSpline(self.arc, nodes.T, bc_type="periodic" if closed else "not-a-knot")
+        self.circle = None if self.flat else _circle(nodes)
 
     def place(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The places (2, k) on the line for points near it, and how far (k,) these are from the polygon."""
@@ -144,8 +148,25 @@ class _Piece:
         distance = np.linalg.norm(offset - share * edge[:, None], axis=0)
         best = np.argmin(distance, axis=1)
         rows = np.arange(points.shape[1])
+        if self.circle is not None:
+            centre, radius = self.circle
+            away = points - centre[:, None]
+            return centre[:, None] + radius * away / np.linalg.norm(away, axis=0), distance[rows, best]
         at = self.arc[best] + share[rows, best] * np.diff(self.arc)[best]
         return np.asarray(self.line(at)).T, distance[rows, best]
+
+
+def _circle(nodes: np.ndarray) -> tuple[np.ndarray, float] | None:
+    """Centre and radius of the circle on which at least four nodes (2, m) lie; None where they do not."""
+    if nodes.shape[1] < 4:
+        return None
+    middle = nodes.mean(axis=1)
+    offset = nodes - middle[:, None]
+    terms = np.column_stack([2 * offset.T, np.ones(nodes.shape[1])])
+    x, y, rest = np.linalg.lstsq(terms, np.sum(offset**2, axis=0), rcond=None)[0]
+    radius = float(np.sqrt(max(rest + x**2 + y**2, 0.0)))
+    off = np.abs(np.hypot(offset[0] - x, offset[1] - y) - radius)
+    return (middle + np.array([x, y]), radius) if np.all(off < ROUND * radius) else None
 
 
 def _chains(edges: np.ndarray, points: np.ndarray) -> list[np.ndarray]:

@@ -26,6 +26,7 @@ from contactopt.problem.coupled import BodyTerm, LocalTerm
 
 if TYPE_CHECKING:
     from contactopt.bodies.fields import Fields
+    from contactopt.bodies.recovery import Region, StressMap
     from contactopt.problem.chart import Chart
     from contactopt.problem.convolution import Kernel
     from contactopt.problem.operators import Product
@@ -260,6 +261,9 @@ class Body(Protocol):
 
     def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
         """For each element the product of the stress errors of U and W (contactopt.bodies.fields); (0,) without elements."""
+
+    def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap | None:
+        """The recovered stress in a region as a linear map of U (contactopt.bodies.recovery); None where it cannot be read."""
 
     def fields(self, U: np.ndarray) -> Fields | None:
         """Displacement and stress at the displacement U (n,); None for a body without any."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 import contactopt
+from contactopt.analysis.places import PLACED
 from contactopt.analysis.quantities import QUANTITIES
 from contactopt.benchmark.keys import help_text
 from contactopt.bodies.solvers import SOLVERS
@@ -90,9 +91,16 @@ def _run(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--quantity",
         metavar="NAME",
-        help="what --accuracy bounds: " + ", ".join(QUANTITIES) + "; of one pair NAME:PAIR",
+        help="what --accuracy bounds: " + ", ".join((*QUANTITIES, *PLACED)) + "; of one pair NAME:PAIR",
     )
     run.add_argument("--adaptive", action="store_true", help="refine only where the quantity needs it")
+    run.add_argument(
+        "--max-unknowns", type=int, metavar="N", help="of a mesh, at which the search for an accuracy ends"
+    )
+    run.add_argument("--time-limit", type=float, metavar="S", help="seconds at which the search for an accuracy ends")
+    run.add_argument(
+        "--max-memory", type=float, metavar="GB", help="memory at which the search for an accuracy ends (2)"
+    )
     run.add_argument(
         "--ranks", type=int, metavar="N", help="processes among which the bodies are dealt out (needs mpi4py)"
     )

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from contactopt.runner import Result
 
 PAGE = "view.html"
-PICTURES = ("deformed", "maps", "pressure", "path")
+PICTURES = ("deformed", "maps", "pressure", "path", "refinement")
 # What a run writes beside summary.json and one VTU file per body.
 RUN_FILES = (
     *(f"{name}.{ending}" for name in PICTURES for ending in FORMATS),
@@ -55,6 +55,12 @@ def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
         from contactopt.figures.animation import path_figure
 
         save(path_figure(result.path), "path")
+    if result.estimate is not None:
+        from contactopt.adaptivity.loop import AdaptedEstimate
+        from contactopt.figures.refinement import refinement_figure
+
+        if isinstance(result.estimate, AdaptedEstimate):
+            save(refinement_figure(result.estimate), "refinement")
 
 
 def write(result: Result, folder: Path) -> None:

@@ -28,6 +28,7 @@ import numpy as np
 
 from contactopt import HalfSpace, Material, Part, Plate, Rigid, Scene, Support, analytic, load_mesh
 from contactopt.adaptivity import refine_locally
+from contactopt.analysis.limits import Limits
 from contactopt.analysis.quantities import peak_pressure
 from contactopt.analysis.solve_scene import solve_scene
 from contactopt.scenes import make_scene
@@ -45,9 +46,9 @@ def slope(x: list[float], y: list[float]) -> float:
 def orders() -> list[dict[str, Any]]:
     """Error in the energy norm of the flat punch, as the square root of the missing energy over the whole energy."""
     rows = []
-    truth = refine_locally(make_scene("punch-2d", degree=2), "energy", 2e-7, max_unknowns=60_000)[1].extrapolated
+    truth = refine_locally(make_scene("punch-2d", degree=2), "energy", 2e-7, limits=Limits(60_000))[1].extrapolated
     for degree, goal in ((1, 4e-4), (2, 3e-6)):
-        estimate = refine_locally(make_scene("punch-2d", degree=degree), "energy", goal, max_unknowns=100_000)[1]
+        estimate = refine_locally(make_scene("punch-2d", degree=degree), "energy", goal, limits=Limits(100_000))[1]
         kept = [level for level in estimate.levels if 1_000 <= level.unknowns <= 100_000]
         errors = [np.sqrt(abs(1 - level.value / truth)) for level in kept]
         rows += [
@@ -158,7 +159,7 @@ def hertz() -> list[dict[str, Any]]:
     for degree in (1, 2):
         scene, exact = cylinder(6.0, 1000.0)
         scene = replace(scene, degree=degree)
-        estimate = refine_locally(scene, "pressure", 3e-4, max_unknowns=20_000)[1]
+        estimate = refine_locally(scene, "pressure", 3e-4, limits=Limits(20_000))[1]
         found = [(level.unknowns, level.value / exact.peak - 1, level.seconds) for level in estimate.levels]
         rows += [row for bound in (1e-2, 1e-3) for row in _reached("adaptive", degree, bound, found)]
         everywhere = []
@@ -234,7 +235,7 @@ def effectivity() -> list[dict[str, Any]]:
     rows = []
     for name, (scene, quantities) in scenes.items():
         for quantity in quantities:
-            best = refine_locally(scene, quantity, 1e-5, max_unknowns=30_000)[1]
+            best = refine_locally(scene, quantity, 1e-5, limits=Limits(30_000))[1]
             for level in best.levels[1:]:
                 true = abs(level.value / best.extrapolated - 1)
                 if true > 5 * abs(best.value / best.extrapolated - 1) and level.unknowns < 8_000:
@@ -285,7 +286,7 @@ def chart() -> list[dict[str, Any]]:
         scene = replace(block(rename(coarse, bottom="y-", top="y+")), degree=degree)
         for goal in (3e-2, 1e-2, 3e-3, 1e-3):
             begin = time.process_time()
-            solved, estimate = refine_locally(scene, "pressure", goal, max_unknowns=60_000)
+            solved, estimate = refine_locally(scene, "pressure", goal, limits=Limits(60_000))
             error = estimate.value / exact.peak - 1
             rows.append(_point(f"adaptive, degree {degree}", solved.reduction.dofs, error, time.process_time() - begin))
     for n in (32, 64, 128, 256, 512):
