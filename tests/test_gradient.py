@@ -43,7 +43,7 @@ CASES = {
         ("nu", "mu", "force:sphere:x"),
         ("shift", "energy"),
     ),
-    "several bodies": (lambda: scenes.make_scene("stack"), ("E", "nu"), ("energy", "pressure:PAIR")),
+    "several bodies": (lambda: scenes.make_scene("stack"), ("E", "nu"), ("energy", "pressure:block-2-block-1.top")),
 }
 
 

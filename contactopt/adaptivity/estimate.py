@@ -11,6 +11,7 @@ from contactopt.analysis.places import StressReading
 from contactopt.analysis.solve_scene import Solved
 from contactopt.derivatives.outputs import seeds_of
 from contactopt.derivatives.states import Duals, Step
+from contactopt.interface.reduction import Reduction
 
 ENERGY = "energy"
 
@@ -76,4 +77,52 @@ def element_errors(solved: Solved, quantity: str) -> ElementErrors:
     )
     bodies = zip(solved.reduction.bodies, step.displaced, Duals(step, dual, seeds.bodies).fields)
     errors = tuple(body.recovery_error(U, W) for body, U, W in bodies)
+    if seeds.reactions is not None and not seeds.bodies:
+        shares = between_contacts(solved, seeds.reactions[:, 0])
+        errors = tuple(inside + share for inside, share in zip(errors, shares))
     return ElementErrors(seeds.value, errors, norm, seeds.stress)
+
+
+def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:
+    """What elements at the contact add to the error of a function of the forces, because the pressure varies between contacts.
+
+    Parameters
+    ----------
+    weights : (k,) derivatives of the quantity by the normal forces
+
+    Returns
+    -------
+    For each body (elements,), signed; elements that hold the nodes of a contact share what it adds
+    """
+    reduction, problem = solved.reduction, solved.reduction.problem
+    added = weights * problem.areas * pressure_errors(reduction, solved.solution.reactions[:, 0])
+    F = [np.asarray(abs(B).T @ np.pad(added[:, None], ((0, 0), (0, problem.dim - 1))).ravel()) for B in reduction.maps]
+    shares = [body.on_elements(force) for body, force in zip(reduction.bodies, F)]
+    total = sum(share.sum() for share in shares)
+    factor = added.sum() / total if total != 0 else 0.0
+    return tuple(factor * share for share in shares)
+
+
+def pressure_errors(reduction: Reduction, forces: np.ndarray) -> np.ndarray:
+    """By how much the pressure at each contact exceeds the force over the area there, (k,) [stress].
+
+    The force at a contact is the integral of the pressure with a hat function: over the area of the hat it is a mean of the
+    pressure nearby. On a line with contacts at distance h that mean is p + h^2 p'' / 12. The mean of the piecewise linear
+    function through the contacts is p + h^2 p'' / 6 as its second differences are h^2 p''. Half of what it differs from the
+    value is the error, and this half is taken on surfaces and where distances vary as well.
+    """
+    problem = reduction.problem
+    pressure = np.divide(forces, problem.areas, out=np.zeros(len(forces)), where=problem.areas > 0)
+    errors = np.zeros(len(forces))
+    for pair, coupling in zip(problem.pairs, reduction.couplings):
+        cells = coupling.cells.T
+        if cells.shape[1] != problem.dim:
+            continue
+        own, points = pressure[pair.contacts], problem.coordinates[:, pair.contacts]
+        edges = points[:, cells[:, 1:]] - points[:, cells[:, :1]]
+        size = np.sqrt(np.linalg.det(np.einsum("dfa,dfb->fab", edges, edges)))[:, None]
+        near = own[cells]
+        smooth = np.bincount(cells.ravel(), (size * (near + near.sum(axis=1, keepdims=True))).ravel(), len(own))
+        whole = (problem.dim + 1) * np.bincount(cells.ravel(), np.broadcast_to(size, near.shape).ravel(), len(own))
+        errors[pair.contacts] = (own - np.divide(smooth, whole, out=own.copy(), where=whole > 0)) / 2
+    return errors

@@ -204,9 +204,10 @@ def _simplicial(scene: Scene) -> tuple[Scene, Curves]:
                 f"body '{part.name}': a solid of second order can be refined locally only with a `curve` for each of its contact "
                 "boundaries."
             )
-        mesh = simplices(given)
-        curves[part.name] = {name: line for name, line in lines.items() if line is not None}
-        return replace(part, mesh=mesh)
+        found = curves[part.name] = {name: line for name, line in lines.items() if line is not None}
+        return replace(
+            part, mesh=simplices(given), curve={name: found[name] for name in surfaces if name in found} or None
+        )
 
     return scene.with_parts(prepared), curves
 

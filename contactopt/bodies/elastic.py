@@ -210,6 +210,10 @@ class ElasticBody:
     def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
         return recovery_error(self.body, U, W)
 
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
+        dofs = self.body.basis.element_dofs
+        return np.asarray((values / np.maximum(np.bincount(dofs.ravel(), minlength=len(values)), 1))[dofs].sum(axis=0))
+
     def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap:
         return stress_map(self.body, region, by_poisson)
 

@@ -262,6 +262,9 @@ class Body(Protocol):
     def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
         """For each element the product of the stress errors of U and W (contactopt.bodies.fields); (0,) without elements."""
 
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
+        """Values of the displacement unknowns (n,) dealt out evenly to the elements that have each; (0,) without elements."""
+
     def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap | None:
         """The recovered stress in a region as a linear map of U (contactopt.bodies.recovery); None where it cannot be read."""
 

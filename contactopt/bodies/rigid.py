@@ -136,6 +136,9 @@ class RigidBody:
     def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
         return np.zeros(0)
 
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
+        return np.zeros(0)
+
     def stress_map(self, region: object, by_poisson: bool = False) -> None:
         return None
 

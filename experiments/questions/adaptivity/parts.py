@@ -26,7 +26,7 @@ degree = {degree}
 mesh = "pin.msh"
 material = {{ E = 210e3, nu = 0.3 }}
 contact = "rim"
-body_force = {{ y = -4.0, x = 1.5 }}
+body_force = {{ y = -4.0, x = 0.8 }}
 [bodies.bearing]
 mesh = "bearing.msh"
 material = {{ E = 110e3, nu = 0.34 }}
@@ -109,7 +109,7 @@ def bracket(degree: int = 1, divided: int = 0, size: float = 8.0) -> Scene:
 
     def side(centre: np.ndarray, kind: str, length: float) -> str:
         x, y, _ = centre
-        if kind == "Circle":
+        if kind in ("Circle", "Ellipse"):
             return "fillet"
         return {0.0: "foot", 80.0: "end"}.get(round(y, 6), "bolt" if abs(y - 12) < 1e-6 and 35 < x < 50 else "side")
 
@@ -160,7 +160,7 @@ def bearing(degree: int = 1, divided: int = 0, size: float = 8.0) -> Scene:
 
     def side(centre: np.ndarray, kind: str, length: float) -> str:
         x, y, _ = centre
-        if kind != "Circle":
+        if kind not in ("Circle", "Ellipse"):
             return "base" if abs(y) < 1e-6 else "side"
         return "hole" if abs(x) < 1e-6 and abs(y - 50) < 1 else "fillet" if y < 30 else "head"
 
