@@ -64,9 +64,14 @@ def unbounded(solved: Solved, quantity: str, stress: StressReading | None, level
 
 
 def re_entrant(mesh: Any, vertex: int) -> bool:
-    """Whether a vertex, or one that shares an element with it, is at a re-entrant corner of the body or on such an edge."""
+    """Whether a vertex, or one within two elements of it, is at a re-entrant corner of the body or on such an edge.
+
+    The recovered stress at the corner itself looks from all sides, and may be less than that next to it.
+    """
     cells = simplices(straight(mesh))
-    near = np.unique(cells.t[:, np.any(cells.t == vertex, axis=0)])
+    near = np.array([vertex])
+    for _ in range(2):
+        near = np.unique(cells.t[:, np.any(np.isin(cells.t, near), axis=0)])
     outer = np.intersect1d(near, cells.boundary_nodes())
     return any(filled(cells, node) > 0.5 + CORNER / (2 * np.pi) for node in outer)
 

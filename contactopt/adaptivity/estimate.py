@@ -44,6 +44,8 @@ class ElementErrors:
         chosen = np.zeros(len(sizes), dtype=bool)
         chosen[order[:count]] = True
         first = np.cumsum([0, *(len(part) for part in self.bodies)])
+        if self.stress is not None and self.stress.uncertainty > abs(self.total):
+            chosen[first[self.stress.body] + self.stress.doubtful] = True
         return tuple(np.flatnonzero(chosen[a:b]) for a, b in pairwise(first))
 
 
@@ -66,17 +68,20 @@ def element_errors(solved: Solved, quantity: str) -> ElementErrors:
     """
     step = Step(solved.reduction, solved.reduction.problem, solved.solution)
     seeds = seeds_of(quantity, step)
-    own = tuple(body.recovery_error(U, U) for body, U in zip(solved.reduction.bodies, step.displaced))
-    energy = sum(body.energy(U) for body, U in zip(solved.reduction.bodies, step.displaced))
-    missing = sum(part.sum() for part in own) / 2
+    bodies, displaced = solved.reduction.bodies, step.displaced
+    fields = displaced
+    if quantity != ENERGY:
+        dual = step.sensitivity.adjoint(
+            reactions=seeds.reactions, multipliers=seeds.multipliers, displacements=seeds.displacements
+        )
+        fields = Duals(step, dual, seeds.bodies).fields
+    found = [body.recovery_errors(U, U, W) for body, U, W in zip(bodies, displaced, fields)]
+    energy = sum(body.energy(U) for body, U in zip(bodies, displaced))
+    missing = sum(own.sum() for own, _ in found) / 2
     norm = float(np.sqrt(missing / energy)) if energy > 0 else 0.0
     if quantity == ENERGY:
-        return ElementErrors(seeds.value, tuple(part / 2 for part in own), norm)
-    dual = step.sensitivity.adjoint(
-        reactions=seeds.reactions, multipliers=seeds.multipliers, displacements=seeds.displacements
-    )
-    bodies = zip(solved.reduction.bodies, step.displaced, Duals(step, dual, seeds.bodies).fields)
-    errors = tuple(body.recovery_error(U, W) for body, U, W in bodies)
+        return ElementErrors(seeds.value, tuple(own / 2 for own, _ in found), norm)
+    errors = tuple(product for _, product in found)
     if seeds.reactions is not None and not seeds.bodies:
         shares = between_contacts(solved, seeds.reactions[:, 0])
         errors = tuple(inside + share for inside, share in zip(errors, shares))

@@ -27,6 +27,7 @@ from contactopt.problem import Solution
 from contactopt.scenes.scene import Part, Scene
 
 LARGEST = "von_mises"
+RIVAL = 0.5  # of the largest scatter, which the places need that are to be looked at more closely
 NEAREST = {2: 4, 3: 8}  # contacts through which the pressure near a place is fitted
 PLACED = ("von_mises:BODY", "von_mises:BODY:BOUNDARY", "von_mises:BODY@X,Y", "stress_xx:BODY@X,Y", "pressure@X,Y")
 
@@ -49,6 +50,8 @@ class StressReading:
     """A stress, and what it was read from.
 
     value  [stress];   place (dim,) where it is [length];   vertex  of the mesh there, or -1;   size  of the elements there [length]
+    uncertainty  by how much it may be off because stresses scatter from element to element [stress]
+    doubtful  numbers of the elements where the stress may be larger than the value, or is as uncertain as it
     body   its number among the parts of the scene;   map, slopes (m, 4 or 6)  of the recovered stress, for its derivative
     """
 
@@ -56,6 +59,8 @@ class StressReading:
     place: np.ndarray
     vertex: int
     size: float
+    uncertainty: float
+    doubtful: np.ndarray = field(repr=False)
     body: int
     map: StressMap = field(repr=False)
     slopes: np.ndarray = field(repr=False)
@@ -121,9 +126,21 @@ def read_stress(place: Place, reduction: Reduction, displaced: tuple[np.ndarray,
         sizes, slopes = stress[:, column], np.zeros(stress.shape)
         slopes[:, column] = 1.0
     top = int(np.argmax(sizes))
+    scatter = recovered.deviation(displaced[number], slopes)
+    above = sizes + scatter - sizes[top]
+    rivals = np.flatnonzero((above > 0) & (scatter >= RIVAL * scatter[above > 0].max(initial=0.0)))
     slopes[np.arange(len(slopes)) != top] = 0.0
-    place_of_it, vertex, size = recovered.places[:, top], int(recovered.sources[top]), recovered.size(top)
-    return StressReading(float(sizes[top]), place_of_it, vertex, size, number, recovered, slopes)
+    return StressReading(
+        float(sizes[top]),
+        recovered.places[:, top],
+        int(recovered.sources[top]),
+        recovered.size(top),
+        float(above.max()),
+        recovered.elements(rivals),
+        number,
+        recovered,
+        slopes,
+    )
 
 
 def map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> StressMap:

@@ -27,7 +27,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.body import Assembly, build_body, reload_body
 from contactopt.bodies.elements import face_nodes
-from contactopt.bodies.fields import Fields, fields_of, recovery_error
+from contactopt.bodies.fields import Fields, fields_of, recovery_errors
 from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
 from contactopt.bodies.recovery import Region, StressMap, stress_map
 from contactopt.bodies.solvers import make_solver, solver_type
@@ -207,8 +207,8 @@ class ElasticBody:
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
 
-    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
-        return recovery_error(self.body, U, W)
+    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+        return recovery_errors(self.body, U, *others)
 
     def on_elements(self, values: np.ndarray) -> np.ndarray:
         dofs = self.body.basis.element_dofs

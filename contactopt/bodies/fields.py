@@ -85,8 +85,8 @@ def nodal_stress(body: Assembly, U: np.ndarray) -> np.ndarray:
     return total / weight
 
 
-def recovery_error(body: Assembly, U: np.ndarray, W: np.ndarray) -> np.ndarray:
-    """For every element the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)) [force length], (elements,).
+def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+    """For each other field W, element by element, the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)) [force length].
 
     s is the stress of a displacement and s* the continuous stress with its averages at the vertices, which is more
     accurate where the solution is smooth. With W = U it is twice the energy of the estimated error in each element; with W
@@ -95,21 +95,22 @@ def recovery_error(body: Assembly, U: np.ndarray, W: np.ndarray) -> np.ndarray:
     Source: Zienkiewicz, Zhu (1987), A simple error estimator and adaptive procedure for practical engineering analysis.
     """
     basis, mesh = body.basis, straight(body.basis.mesh)
-    shape = SHAPES[mesh.refdom.__name__][1][1]()
-    vertices = skfem.Basis(mesh, shape, quadrature=(basis.X, basis.W))
-    first, second = (
-        sum(
-            nodal_stress(body, field)[:, :, mesh.t[i]][..., None] * np.asarray(vertices.basis[i][0])
-            for i in range(len(mesh.t))
-        )
-        - stress_in(body, basis, field)
-        for field in (U, W)
-    )
+    vertices = skfem.Basis(mesh, SHAPES[mesh.refdom.__name__][1][1](), quadrature=(basis.X, basis.W))
+
+    def missing(field: np.ndarray) -> np.ndarray:
+        nodal = nodal_stress(body, field)
+        smooth = sum(nodal[:, :, own][..., None] * np.asarray(shape[0]) for own, shape in zip(mesh.t, vertices.basis))
+        return np.asarray(smooth - stress_in(body, basis, field))
+
     E, nu = body.material.E, body.material.nu
-    traces = np.trace(first) * np.trace(second)
-    density = ((1 + nu) * np.sum(first * second, axis=(0, 1)) - nu * traces) / E
-    weight = weight_at(body.weight, np.asarray(basis.global_coordinates()))
-    return np.asarray(np.sum(density * basis.dx * weight, axis=1))
+    measure = basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates()))
+    first, found = missing(U), []
+    for W in others:
+        second = first if W is U else missing(W)
+        traces = np.trace(first) * np.trace(second)
+        density = ((1 + nu) * np.sum(first * second, axis=(0, 1)) - nu * traces) / E
+        found.append(np.asarray(np.sum(density * measure, axis=1)))
+    return tuple(found)
 
 
 def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:

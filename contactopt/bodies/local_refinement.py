@@ -8,7 +8,8 @@ the surface that the mesh stands for.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import combinations
 from typing import Any
@@ -53,7 +54,8 @@ def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Curve]) -> Any:
     A mesh of the same kind with the same named boundaries.
     """
     nameless = replace(mesh, _boundaries=None)  # scikit-fem would warn that it loses the names
-    fine = _named(mesh, nameless.refined(np.asarray(marked)))
+    with _no_word_of_copies():
+        fine = _named(mesh, nameless.refined(np.asarray(marked)))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
     points = fine.p.copy()
     for name, curve in curves.items():
@@ -67,6 +69,21 @@ def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Curve]) -> Any:
         )
         return fine
     return replace(fine, doflocs=points)
+
+
+@contextmanager
+def _no_word_of_copies() -> Iterator[None]:
+    """scikit-fem says of large arrays that it copies them; no user can do anything about it."""
+    skfem_log = logging.getLogger("skfem.mesh.mesh")
+
+    def filtered(record: logging.LogRecord) -> bool:
+        return "C_CONTIGUOUS" not in record.getMessage()
+
+    skfem_log.addFilter(filtered)
+    try:
+        yield
+    finally:
+        skfem_log.removeFilter(filtered)
 
 
 def _volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:

@@ -259,8 +259,8 @@ class Body(Protocol):
         U (n,) is the displacement under the contact forces `force` (n,).
         """
 
-    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
-        """For each element the product of the stress errors of U and W (contactopt.bodies.fields); (0,) without elements."""
+    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+        """For each other field the products (elements,) of its stress errors with those of U (contactopt.bodies.fields)."""
 
     def on_elements(self, values: np.ndarray) -> np.ndarray:
         """Values of the displacement unknowns (n,) dealt out evenly to the elements that have each; (0,) without elements."""

@@ -60,13 +60,15 @@ class StressMap:
 
     places   (dim, m) [length]
     sources  (m,) vertices of the mesh, -1 for a place that is none
-    weights  R (m, points): what the stresses of the elements contribute to each place
+    fit      of the stresses of the elements around each place
+    used     numbers of the elements whose stresses are fitted
     body, basis, constants  of the element stress: the quadrature points, and the constants lambda and mu of the material
     """
 
     places: np.ndarray
     sources: np.ndarray
-    weights: sp.csr_matrix
+    fit: Fit
+    used: np.ndarray
     body: Assembly
     basis: skfem.CellBasis
     constants: tuple[float, float]
@@ -74,6 +76,19 @@ class StressMap:
     def stress(self, U: np.ndarray) -> np.ndarray:
         """The recovered stress (m, 4 or 6) at the displacement U (n,), components as in contactopt.bodies.fields.STRESSES."""
         return np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1)
+
+    def deviation(self, U: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        """Standard error (m,) of a function with derivatives `slopes` (m, 4 or 6) by the recovered stress.
+
+        The stresses of the elements around a place scatter about the fit, and what is fitted is as uncertain as that.
+        """
+        columns = zip(self._element_stress, slopes.T)
+        return np.asarray(np.sqrt(sum((slope * self.fit.deviation(rows @ U)) ** 2 for rows, slope in columns)))
+
+    def elements(self, places: np.ndarray) -> np.ndarray:
+        """Numbers of the elements around some of the places, given by their numbers."""
+        chosen = np.isin(self.fit.row, places)
+        return np.asarray(self.used[np.unique(self.fit.column[chosen] // len(self.basis.W))])
 
     def transposed(self, slopes: np.ndarray) -> np.ndarray:
         """The derivative (n,) by U of a function with derivatives `slopes` (m, 4 or 6) by the recovered stress."""
@@ -85,6 +100,12 @@ class StressMap:
         own = np.unique(self.weights[number].indices // len(self.basis.W))
         volume = np.asarray(self.basis.dx)[own].sum(axis=1)
         return float(np.mean(volume) ** (1 / len(self.places)))
+
+    @cached_property
+    def weights(self) -> sp.csr_matrix:
+        """R (m, points): what the stresses of the elements contribute to each place."""
+        shape = (len(self.sources), self.basis.nelems * len(self.basis.W))
+        return sp.csr_matrix((self.fit.weights, (self.fit.row, self.fit.column)), shape)
 
     @cached_property
     def _element_stress(self) -> tuple[sp.csr_matrix, ...]:
@@ -135,10 +156,9 @@ def stress_map(body: Assembly, region: Region, by_poisson: bool = False) -> Stre
     points = (np.searchsorted(used, patches.indices)[:, None] * count + np.arange(count)).ravel()
     row = np.repeat(row, count)
     at = np.asarray(basis.global_coordinates()).reshape(len(mesh.p), -1)
-    weights = _fit(at[:, points] - places[:, row], row, len(sources), terms)
-    shape = (len(sources), basis.nelems * count)
+    fit = _fit(at[:, points] - places[:, row], row, points, len(sources), terms)
     constants = lame_by_poisson(body.material) if by_poisson else lame(body.material)
-    return StressMap(places, sources, sp.csr_matrix((weights, (row, points)), shape), body, basis, constants)
+    return StressMap(places, sources, fit, used, body, basis, constants)
 
 
 def _places(name: str, mesh: Any, region: Region) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
@@ -211,8 +231,37 @@ def _terms(dim: int, degree: int) -> list[tuple[int, ...]]:
     return [axes for order in range(degree + 1) for axes in combinations_with_replacement(range(dim), order)]
 
 
-def _fit(offset: np.ndarray, row: np.ndarray, count: int, terms: list[tuple[int, ...]]) -> np.ndarray:
-    """The coefficients c of points at `offset` (dim, points) from the places to which `row` says they belong."""
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The least-squares fits around m places.
+
+    row      (p,) the place to which each point of a patch belongs;   column  (p,) its number among all points
+    powers   (p, t) monomials of the offsets;   inverse  (m, t, t) inverse of their moments
+    """
+
+    row: np.ndarray
+    column: np.ndarray
+    powers: np.ndarray
+    inverse: np.ndarray
+
+    @property
+    def weights(self) -> np.ndarray:
+        """(p,) what the value at each point contributes to the fit at its place."""
+        return np.asarray(np.sum(self.inverse[self.row, 0] * self.powers, axis=1))
+
+    def deviation(self, values: np.ndarray) -> np.ndarray:
+        """Standard error (m,) of the fit of values (points,) at the places, from what the fit leaves."""
+        count, own = len(self.inverse), values[self.column]
+        sums = [np.bincount(self.row, own * power, count) for power in self.powers.T]
+        coefficients = np.einsum("mab,bm->ma", self.inverse, np.array(sums))
+        left = own - np.sum(coefficients[self.row] * self.powers, axis=1)
+        free = np.maximum(np.bincount(self.row, minlength=count) - self.powers.shape[1], 1)
+        variance = np.bincount(self.row, left**2, count) / free
+        return np.asarray(np.sqrt(np.maximum(self.inverse[:, 0, 0], 0.0) * variance))
+
+
+def _fit(offset: np.ndarray, row: np.ndarray, column: np.ndarray, count: int, terms: list[tuple[int, ...]]) -> Fit:
+    """The fits of points at `offset` (dim, p) from the places to which `row` says they belong."""
     size = np.zeros(count)
     np.maximum.at(size, row, np.linalg.norm(offset, axis=0))
     scaled = offset / size[row]
@@ -221,8 +270,7 @@ def _fit(offset: np.ndarray, row: np.ndarray, count: int, terms: list[tuple[int,
     for i, first in enumerate(powers):
         for j, second in enumerate(powers[: i + 1]):
             moments[:, i, j] = moments[:, j, i] = np.bincount(row, first * second, count)
-    values = np.linalg.pinv(moments, rcond=1e-10, hermitian=True)[:, 0]
-    return np.asarray(np.sum(values[row].T * powers, axis=0))
+    return Fit(row, column, powers.T, np.linalg.pinv(moments, rcond=1e-10, hermitian=True))
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:

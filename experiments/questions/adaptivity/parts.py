@@ -26,11 +26,13 @@ degree = {degree}
 mesh = "pin.msh"
 material = {{ E = 210e3, nu = 0.3 }}
 contact = "rim"
+curve = {{ radius = 12, centre = {{ x = 0, y = 49.95 }} }}
 body_force = {{ y = -4.0, x = 0.8 }}
 [bodies.bearing]
 mesh = "bearing.msh"
 material = {{ E = 110e3, nu = 0.34 }}
 contact = "hole"
+curve = {{ radius = 12.05, centre = {{ x = 0, y = 50 }} }}
 [bodies.ground]
 mesh = "ground.msh"
 material = {{ E = 70e3, nu = 0.33 }}
@@ -135,6 +137,12 @@ def bracket(degree: int = 1, divided: int = 0, size: float = 8.0) -> Scene:
     return Scene("bracket on a block", *bodies, 0.3, degree=degree, units=("mm", "MPa"))
 
 
+def circle(*sphere: float) -> Callable[[np.ndarray], np.ndarray]:
+    """The function that puts points on the circle or sphere of a centre and a radius."""
+    middle, radius = np.array(sphere[:-1])[:, None], sphere[-1]
+    return lambda x: middle + radius * (x - middle) / np.linalg.norm(x - middle, axis=0)
+
+
 def pin_in_bush(degree: int = 1, divided: int = 0, size: float = 6.0) -> Scene:
     """A steel pin of 19.9 mm in a bush with a hole of 20 mm, clamped at its outside of 45 mm, pressed down."""
     with TemporaryDirectory() as name, gmsh_model(size, divided) as gmsh:
@@ -149,8 +157,8 @@ def pin_in_bush(degree: int = 1, divided: int = 0, size: float = 6.0) -> Scene:
         )
     force = BodyForce((0.0, -3000.0 / (np.pi * 19.9**2)))
     bodies = (
-        Part("pin", pin, STEEL, (), (force,), "rim"),
-        Part("bush", bush, STEEL, (Support("outside"),), (), "hole"),
+        Part("pin", pin, STEEL, (), (force,), "rim", circle(0.0, -0.1, 19.9)),
+        Part("bush", bush, STEEL, (Support("outside"),), (), "hole", circle(0.0, 0.0, 20.0)),
     )
     return Scene("pin in a bush", *bodies, 0.2, degree=degree, units=("mm", "MPa"))
 
@@ -190,10 +198,6 @@ def bearing(degree: int = 1, divided: int = 0, size: float = 8.0) -> Scene:
 def ball(degree: int = 1, divided: int = 0, size: float = 7.0, force: float = 7692.0) -> Scene:
     """A steel ball of radius 20 on a steel block 60 x 60 x 30, a quarter of both by symmetry, tetrahedra of one size."""
 
-    def on_sphere(x: np.ndarray) -> np.ndarray:
-        middle = np.array([[0.0], [0.0], [20.0]])
-        return middle + 20.0 * (x - middle) / np.linalg.norm(x - middle, axis=0)
-
     def side(centre: np.ndarray, kind: str, length: float) -> str:
         x, y, z = np.round(centre, 6)
         planes = {"x": x == 0, "y": y == 0, "top": z in (0.0, 20.0) and kind == "Plane", "bottom": z == -30.0}
@@ -207,7 +211,15 @@ def ball(degree: int = 1, divided: int = 0, size: float = 7.0, force: float = 76
         block = load_mesh(save(gmsh, Path(name) / "block.msh", [(3, occ.addBox(0, 0, -30, 30, 30, 30))], side))
     planes = (Support("x", {"x": 0.0}), Support("y", {"y": 0.0}))
     bodies = (
-        Part("ball", sphere, STEEL, planes, (Plate("top", {"z": -force}, glued=False),), "sphere", on_sphere),
+        Part(
+            "ball",
+            sphere,
+            STEEL,
+            planes,
+            (Plate("top", {"z": -force}, glued=False),),
+            "sphere",
+            circle(0.0, 0.0, 20.0, 20.0),
+        ),
         Part("block", block, STEEL, (*planes, Support("bottom")), (), "top"),
     )
     return Scene(
