@@ -27,6 +27,7 @@ from contactopt.problem import Solution
 from contactopt.scenes.scene import Part, Scene
 
 LARGEST = "von_mises"
+DEVIATIONS = 2  # standard errors of a fit that a stress may be off: 95 of 100 are within two
 RIVAL = 0.5  # of the largest scatter, which the places need that are to be looked at more closely
 NEAREST = {2: 4, 3: 8}  # contacts through which the pressure near a place is fitted
 PLACED = ("von_mises:BODY", "von_mises:BODY:BOUNDARY", "von_mises:BODY@X,Y", "stress_xx:BODY@X,Y", "pressure@X,Y")
@@ -126,7 +127,7 @@ def read_stress(place: Place, reduction: Reduction, displaced: tuple[np.ndarray,
         sizes, slopes = stress[:, column], np.zeros(stress.shape)
         slopes[:, column] = 1.0
     top = int(np.argmax(sizes))
-    scatter = recovered.deviation(displaced[number], slopes)
+    scatter = DEVIATIONS * recovered.deviation(displaced[number], slopes)
     above = sizes + scatter - sizes[top]
     rivals = np.flatnonzero((above > 0) & (scatter >= RIVAL * scatter[above > 0].max(initial=0.0)))
     slopes[np.arange(len(slopes)) != top] = 0.0
