@@ -15,7 +15,7 @@ from contactopt.analysis.limits import Limits
 from contactopt.analysis.progress import resident_memory
 from contactopt.analysis.solve_scene import Options, Solved, solve_scene
 from contactopt.bodies.elements import is_curved
-from contactopt.bodies.local_refinement import Curve, boundary_curve, divide, simplices
+from contactopt.bodies.local_refinement import Curve, bent, boundary_curve, divide, simplices
 from contactopt.cards import count, line
 from contactopt.checks import check_number
 from contactopt.errors import InputError
@@ -115,13 +115,13 @@ def refine_locally(
     check_number("the accuracy", accuracy, low=0.0, high=1.0)
     options, limits = options or Options(), limits or Limits()
     began, before = time.perf_counter(), resident_memory()
-    scene, curves = _simplicial(scene)
+    scene, curves = simplicial(scene)
     levels: list[AdaptedLevel] = []
     solved: Solved | None = None
     infinite = ""
     while True:
         start = time.perf_counter()
-        previous, solved = solved, solve_scene(scene, options=options, start=solved)
+        previous, solved = solved, solve_scene(with_bent_edges(scene, curves), options=options, start=solved)
         if not solved.solution.solved:
             message = f"the mesh of {solved.reduction.dofs} unknowns was not solved: {solved.solution.message}"
             if not levels:
@@ -184,7 +184,7 @@ def _unknowns(scene: Scene) -> int:
 Curves = dict[str, dict[str, Curve]]  # name of the body -> name of the boundary -> curve
 
 
-def _simplicial(scene: Scene) -> tuple[Scene, Curves]:
+def simplicial(scene: Scene) -> tuple[Scene, Curves]:
     """The scene on meshes of triangles or tetrahedra, and for every body the curves of its contact boundaries."""
     curves: Curves = {}
 
@@ -210,6 +210,15 @@ def _simplicial(scene: Scene) -> tuple[Scene, Curves]:
         )
 
     return scene.with_parts(prepared), curves
+
+
+def with_bent_edges(scene: Scene, curves: Curves) -> Scene:
+    """The scene as it is solved: with quadratic displacements the edges follow the curved boundaries."""
+    if scene.degree == 1:
+        return scene
+    return scene.with_parts(
+        lambda part: replace(part, mesh=bent(part.mesh, curves[part.name])) if isinstance(part, Part) else part
+    )
 
 
 def _finer(scene: Scene, marked: tuple[np.ndarray, ...], curves: Curves) -> Scene:

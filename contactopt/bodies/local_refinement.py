@@ -26,6 +26,7 @@ Curve = Callable[[np.ndarray], np.ndarray]
 NEAREST = 16  # old facets among which the one that holds a new facet is looked for
 FLAT = 0.1  # least share of its volume that an element keeps where its nodes move to a curved boundary
 ROUND = 1e-5  # distance of nodes from a circle, over its radius, within which they lie on it: files round their numbers
+BENT = 0.15  # sagitta of an edge over its length, beyond which the mesh is too coarse for its curve
 CORNER = np.deg2rad(30)  # turn of a polygon between two edges from which on it is a corner of the body
 
 
@@ -69,6 +70,27 @@ def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Curve]) -> Any:
         )
         return fine
     return replace(fine, doflocs=points)
+
+
+def bent(mesh: Any, curves: Mapping[str, Curve]) -> Any:
+    """A plane mesh of straight triangles with its edges bent along the curved boundaries, of second order then.
+
+    Elements and named boundaries keep their numbers. An edge that would leave its chord by more than BENT of its length stays
+    straight; so do solids, and meshes without a curved boundary.
+    """
+    known = {name: curve for name, curve in curves.items() if len(mesh.boundaries[name])}
+    if len(mesh.p) != 2 or not known:
+        return mesh
+    made = skfem.MeshTri2.from_mesh(mesh)
+    points = made.doflocs.copy()
+    for name, curve in known.items():
+        facets = mesh.boundaries[name]
+        middle = made.dofs.facet_dofs[0, facets]
+        start, end = mesh.p[:, mesh.facets[:, facets]].transpose(1, 0, 2)
+        new = curve((start + end) / 2)
+        near = np.linalg.norm(new - (start + end) / 2, axis=0) <= BENT * np.linalg.norm(end - start, axis=0)
+        points[:, middle[near]] = new[:, near]
+    return replace(made, doflocs=points, _boundaries=mesh.boundaries)
 
 
 @contextmanager

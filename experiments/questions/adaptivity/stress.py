@@ -9,7 +9,7 @@ from typing import Any
 
 from contactopt import Scene, analytic
 from contactopt.adaptivity import refine_locally
-from contactopt.adaptivity.loop import AdaptedEstimate
+from contactopt.adaptivity.loop import AdaptedEstimate, simplicial, with_bent_edges
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.places import place_of, read_place
 from contactopt.analysis.quantities import QUANTITIES
@@ -57,7 +57,7 @@ def everywhere(case: Case, degree: int) -> list[Found]:
     """Meshes of smaller and smaller elements everywhere; without the time of Gmsh."""
     found = []
     for divided in range(case.most[degree] + 1):
-        scene = case.make(degree, divided)
+        scene = with_bent_edges(*simplicial(case.make(degree, divided)))
         begin = time.process_time()
         solved = solve_scene(scene)
         value = read(solved, case.quantity)
@@ -88,7 +88,7 @@ def stress() -> list[dict[str, Any]]:
 def one_part(name: str) -> Iterator[dict[str, Any]]:
     """The rows of one part; the truth is the extrapolated value of a very fine mesh of quadratic elements."""
     case = CASES[name]
-    fine = refine_locally(case.make(2), case.quantity, 1e-5, limits=Limits(150_000))[1]
+    fine = refine_locally(case.make(2), case.quantity, 1e-4, limits=Limits(80_000))[1]
     truth = fine.extrapolated
     for degree in (1, 2):
         local, _ = locally(case.make(degree), case.quantity, BOUND / 5, 40_000)
