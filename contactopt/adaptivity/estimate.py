@@ -22,6 +22,7 @@ class ElementErrors:
 
     value      of the quantity [its unit]
     bodies     for each body what its elements add (elements,), signed [unit of the quantity]; (0,) for a body without a mesh
+    between    what of it comes from the pressure between contacts [unit of the quantity]
     energy     estimated error of the displacement in the energy norm, over the norm of the displacement [-]
     stress     where the quantity is a stress: the reading of it
     """
@@ -29,12 +30,18 @@ class ElementErrors:
     value: float
     bodies: tuple[np.ndarray, ...]
     energy: float
+    between: float = 0.0
     stress: StressReading | None = None
 
     @property
     def total(self) -> float:
         """The estimated error J - J_h [unit of the quantity]."""
         return float(sum(part.sum() for part in self.bodies))
+
+    @property
+    def size(self) -> float:
+        """The estimated size of the error: of the stress in the elements and of the pressure between contacts together."""
+        return abs(self.total - self.between) + abs(self.between)
 
     def marked(self, share: float) -> tuple[np.ndarray, ...]:
         """For each body the fewest elements that together make this share of the sum of absolute errors (Doerfler)."""
@@ -81,11 +88,12 @@ def element_errors(solved: Solved, quantity: str) -> ElementErrors:
     norm = float(np.sqrt(missing / energy)) if energy > 0 else 0.0
     if quantity == ENERGY:
         return ElementErrors(seeds.value, tuple(own / 2 for own, _ in found), norm)
-    errors = tuple(product for _, product in found)
+    errors, between = tuple(product for _, product in found), 0.0
     if seeds.reactions is not None and not seeds.bodies:
         shares = between_contacts(solved, seeds.reactions[:, 0])
         errors = tuple(inside + share for inside, share in zip(errors, shares))
-    return ElementErrors(seeds.value, errors, norm, seeds.stress)
+        between = float(sum(share.sum() for share in shares))
+    return ElementErrors(seeds.value, errors, norm, between, seeds.stress)
 
 
 def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -126,8 +134,11 @@ def pressure_errors(reduction: Reduction, forces: np.ndarray) -> np.ndarray:
         own, points = pressure[pair.contacts], problem.coordinates[:, pair.contacts]
         edges = points[:, cells[:, 1:]] - points[:, cells[:, :1]]
         size = np.sqrt(np.linalg.det(np.einsum("dfa,dfb->fab", edges, edges)))[:, None]
-        near = own[cells]
-        smooth = np.bincount(cells.ravel(), (size * (near + near.sum(axis=1, keepdims=True))).ravel(), len(own))
-        whole = (problem.dim + 1) * np.bincount(cells.ravel(), np.broadcast_to(size, near.shape).ravel(), len(own))
+        p, r = own[cells], points[0][cells] if reduction.scene.kind == "axisymmetric" else np.ones(cells.shape)
+        (sum_p, sum_r), corner = (x.sum(axis=1, keepdims=True) for x in (p, r)), cells.ravel()
+        # integrals of phi_a phi_b phi_c r_c p_b over a simplex, in units of its smallest one
+        mean = sum_p * sum_r + p * sum_r + r * sum_p + np.sum(p * r, axis=1, keepdims=True) + 2 * p * r
+        smooth = np.bincount(corner, (size * mean).ravel(), len(own))
+        whole = (problem.dim + 2) * np.bincount(corner, (size * (sum_r + r)).ravel(), len(own))
         errors[pair.contacts] = (own - np.divide(smooth, whole, out=own.copy(), where=whole > 0)) / 2
     return errors

@@ -155,7 +155,7 @@ def _level(solved: Solved, errors: ElementErrors, before: list[AdaptedLevel], be
     change = abs(errors.value - before[-1].value) if before else 0.0
     scale = abs(errors.value) or 1.0
     found = errors.stress
-    error = max(abs(errors.total), change, 0.0 if found is None else found.uncertainty) / scale
+    error = max(errors.size, change, 0.0 if found is None else found.uncertainty) / scale
     size = solved.reduction.dofs, solved.reduction.problem.contacts
     at = () if found is None else (tuple(found.place.tolist()), found.size)
     return AdaptedLevel(*size, errors.value, error, errors.energy, time.perf_counter() - began, *at)
