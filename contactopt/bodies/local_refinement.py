@@ -81,7 +81,8 @@ def bent(mesh: Any, curves: Mapping[str, Curve]) -> Any:
     known = {name: curve for name, curve in curves.items() if len(mesh.boundaries[name])}
     if len(mesh.p) != 2 or not known:
         return mesh
-    made = skfem.MeshTri2.from_mesh(mesh)
+    with _no_word_of_copies():
+        made = skfem.MeshTri2.from_mesh(mesh)
     points = made.doflocs.copy()
     for name, curve in known.items():
         facets = mesh.boundaries[name]
