@@ -15,11 +15,14 @@ if TYPE_CHECKING:
 def refinement_figure(estimate: AdaptedEstimate) -> Any:
     """Two axes over the unknowns of each mesh: estimated errors, on logarithmic axes with the target, and the value.
 
+    The dotted line is the last value with its estimated error added.
+
     Parameters
     ----------
     estimate : what contactopt.adaptivity.refine_locally found
     """
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     figure = Figure(figsize=(9.6, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
@@ -35,10 +38,11 @@ def refinement_figure(estimate: AdaptedEstimate) -> Any:
     values = np.array([level.value for level in estimate.levels])
     bar = errors * np.abs(values)
     right.errorbar(unknowns, values, bar, fmt="o-", color=BLUE, capsize=3)
-    right.axhline(estimate.extrapolated, color=GREY, lw=1, ls=":", label="with the estimated error added")
-    right.set(xscale="log", xlabel="unknowns [-]", ylabel=estimate.quantity, title="value and estimated error")
+    right.axhline(estimate.extrapolated, color=GREY, lw=1, ls=":")
+    right.set(xscale="log", xlabel="unknowns [-]", ylabel=estimate.quantity, title="value, with the estimated error")
     right.set_ylim(*_shown(values, bar))
-    right.legend(frameon=False)
+    for axes in (left, right):
+        axes.xaxis.set_minor_formatter(NullFormatter())
     return figure
 
 
