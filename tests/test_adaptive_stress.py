@@ -14,9 +14,11 @@ from contactopt.adaptivity.estimate import element_errors, pressure_errors
 from contactopt.analysis.accuracy import refine
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.solve_scene import solve_scene
-from contactopt.bodies.local_refinement import boundary_curve
+from contactopt.bodies.local_refinement import bent, boundary_curve
 from contactopt.cli import main
+from contactopt.interface.reduction import reduce_bodies
 from contactopt.scenes import make_scene
+from experiments.questions.adaptivity.parts import ball as gmsh_ball
 
 
 def tube_stress(scene):
@@ -95,6 +97,22 @@ def test_arcs_are_told_from_polygons():
         assert boundary_curve(mesh, "inner") is not None
     between = 0.97 * np.array([np.cos(angle[:-1] + 0.1), np.sin(angle[:-1] + 0.1)])
     assert curves[1] is None and np.allclose(np.linalg.norm(curves[0](between), axis=0), 1.0, atol=1e-12)
+
+
+def test_bent_edges_follow_the_circle():
+    """The area of a disc of triangles, with straight edges and with edges along its circle."""
+    disc = skfem.MeshTri.init_circle(2)
+    mesh = disc.with_boundaries({"rim": disc.boundary_facets()})
+    curved = bent(mesh, {"rim": boundary_curve(mesh, "rim")})
+    straight, along = (skfem.Basis(made, skfem.ElementTriP1(), intorder=4).dx.sum() for made in (mesh, curved))
+    assert abs(straight / np.pi - 1) > 0.02 and abs(along / np.pi - 1) < 2e-4
+    assert np.array_equal(curved.boundaries["rim"], mesh.boundaries["rim"]) and np.array_equal(curved.t, mesh.t)
+    assert bent(mesh, {}) is mesh
+
+
+def test_a_quarter_model_whose_nodes_do_not_match_knows_its_planes():
+    reduction = reduce_bodies(gmsh_ball(size=9.0))
+    assert reduction.problem.chart.mirrored == (True, True) and len(reduction.coupling.planes) == 2
 
 
 def ball(size):

@@ -10,7 +10,8 @@ from contactopt import InputError, Part, Rigid, Scene, Support, scenes
 from contactopt.analysis.places import place_of, read_place, read_stress
 from contactopt.analysis.solve_scene import solve_scene
 from contactopt.bodies.fields import STRESSES, fields_of, nodal_stress
-from contactopt.bodies.recovery import Region, stress_map, von_mises, von_mises_slopes
+from contactopt.bodies.protocol import Region
+from contactopt.bodies.recovery import stress_map, von_mises, von_mises_slopes
 from contactopt.interface.reduction import reduce_bodies
 from contactopt.scenes import make_scene
 
@@ -148,3 +149,18 @@ def test_the_largest_stress_under_a_line_contact_is_where_it_should_be():
     a, peak = scene.reference.half_width, scene.reference.peak
     assert found.value == pytest.approx(0.558 * peak, rel=0.02)
     assert abs(found.place[0]) < 0.1 * a and abs(found.place[1]) == pytest.approx(0.704 * a, rel=0.15)
+
+
+def test_the_scatter_of_the_elements_is_the_uncertainty_of_the_fit():
+    """No scatter, no uncertainty; and the fits of noise of known size deviate by as much as they say, on average."""
+    random = np.random.default_rng(2)
+    body = assembled(skfem.MeshTri.init_tensor(np.linspace(0, 1, 13), np.linspace(0, 1, 13)))
+    found = stress_map(body, Region())
+    U = np.zeros(body.basis.N)
+    U[body.unknowns] = np.array([0.1 * body.locations[0], -0.3 * body.locations[1]])
+    slopes = np.tile([1.0, 0.0, 0.0, 0.0], (len(found.sources), 1))
+    assert found.deviation(U, slopes).max() < 1e-12
+    noise = random.standard_normal((40, found.basis.nelems * len(found.basis.W)))
+    off = np.sqrt(np.mean((found.weights @ noise.T) ** 2))
+    said = np.sqrt(np.mean([found.fit.deviation(one) ** 2 for one in noise]))
+    assert said == pytest.approx(off, rel=0.05)

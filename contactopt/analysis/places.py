@@ -15,16 +15,18 @@ Each reading comes with its slopes, the derivatives by what it was read from.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.bodies.fields import STRESSES
-from contactopt.bodies.recovery import Region, StressMap, von_mises, von_mises_slopes
+from contactopt.bodies.protocol import Region
 from contactopt.errors import InputError
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution
 from contactopt.scenes.scene import Part, Scene
+
+if TYPE_CHECKING:
+    from contactopt.bodies.recovery import StressMap
 
 LARGEST = "von_mises"
 DEVIATIONS = 2  # standard errors of a fit that a stress may be off: 95 of 100 are within two
@@ -72,6 +74,8 @@ def place_of(name: Any, scene: Scene) -> Place | None:
 
     Raises InputError for a body, pair, component or point that the scene does not have.
     """
+    from contactopt.bodies.fields import STRESSES
+
     if not isinstance(name, str):
         return None
     head, at, where = name.partition("@")
@@ -117,6 +121,9 @@ def read_stress(place: Place, reduction: Reduction, displaced: tuple[np.ndarray,
 
     Raises InputError for a boundary that the body does not have, a point outside the body, and a body on another rank.
     """
+    from contactopt.bodies.fields import STRESSES
+    from contactopt.bodies.recovery import von_mises, von_mises_slopes
+
     number = [part.name for part in reduction.scene.parts].index(place.owner)
     recovered = map_of(place, reduction)
     stress = recovered.stress(displaced[number])

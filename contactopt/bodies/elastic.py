@@ -28,8 +28,8 @@ import scipy.sparse as sp
 from contactopt.bodies.body import Assembly, build_body, reload_body
 from contactopt.bodies.elements import face_nodes
 from contactopt.bodies.fields import Fields, fields_of, recovery_errors
-from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
-from contactopt.bodies.recovery import Region, StressMap, stress_map
+from contactopt.bodies.protocol import Equilibrium, Mesh, Region, Surface
+from contactopt.bodies.recovery import StressMap, stress_map
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.errors import InputError

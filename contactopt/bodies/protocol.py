@@ -26,7 +26,7 @@ from contactopt.problem.coupled import BodyTerm, LocalTerm
 
 if TYPE_CHECKING:
     from contactopt.bodies.fields import Fields
-    from contactopt.bodies.recovery import Region, StressMap
+    from contactopt.bodies.recovery import StressMap
     from contactopt.problem.chart import Chart
     from contactopt.problem.convolution import Kernel
     from contactopt.problem.operators import Product
@@ -80,6 +80,18 @@ class Equilibrium:
         """The part of T C T' for a map T (rows, n) of the contact unknowns, before condensation."""
         left, right = self.low_rank
         return LocalTerm(T[:, self.free], self.stiffness, self.cycle, self.diagonal, (T @ left, T @ right))
+
+
+@dataclass(frozen=True)
+class Region:
+    """Where in a body: on a named boundary, at a point, in the circle or ball around a point, or everywhere.
+
+    boundary  its name;   point  coordinates [length];   radius  around the point [length]
+    """
+
+    boundary: str = ""
+    point: tuple[float, ...] = ()
+    radius: float | None = None
 
 
 class Equilibrated(Protocol):

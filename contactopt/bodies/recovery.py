@@ -33,6 +33,7 @@ from contactopt.bodies.body import Assembly
 from contactopt.bodies.elements import straight
 from contactopt.bodies.fields import PLACES
 from contactopt.bodies.local_refinement import simplices
+from contactopt.bodies.protocol import Region
 from contactopt.errors import InputError
 from contactopt.material import lame, lame_by_poisson
 
@@ -40,18 +41,6 @@ OUTSIDE = (
     0.2  # how far beyond an element a point may lie, over the element's size: the arc beyond the edge of a coarse mesh
 )
 POINTS = 1.5  # least number of points in a patch, over the number of coefficients
-
-
-@dataclass(frozen=True)
-class Region:
-    """Where in a body: on a named boundary, at a point, in the circle or ball around a point, or everywhere.
-
-    boundary  its name;   point  coordinates [length];   radius  around the point [length]
-    """
-
-    boundary: str = ""
-    point: tuple[float, ...] = ()
-    radius: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
