@@ -354,7 +354,7 @@ class _Search:
         reduction, solution, zones = solved.reduction, solved.solution, solved.zones
         seen = self._seen(reduction, solution)
         if self.place is not None:
-            value = read_place(self.place, reduction, solution), 0.0
+            value = read_place(self.place, reduction, solution)
         else:
             value = QUANTITIES[self.name](*seen), uncertainty(self.name, *seen)
         size = reduction.dofs, reduction.problem.contacts, max(1, len(zones) - 1), zones[-2] if zones else None

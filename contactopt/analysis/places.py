@@ -186,8 +186,9 @@ def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
     return weights
 
 
-def read_place(place: Place, reduction: Reduction, solution: Solution) -> float:
-    """The value of a quantity at a place [stress]."""
+def read_place(place: Place, reduction: Reduction, solution: Solution) -> tuple[float, float]:
+    """The value of a quantity at a place and, of a stress, by how much it may be off [stress]."""
     if place.kind == "pressure":
-        return float(np.sum(pressure_weights(place, reduction) * solution.reactions))
-    return read_stress(place, reduction, reduction.displaced(solution)).value
+        return float(np.sum(pressure_weights(place, reduction) * solution.reactions)), 0.0
+    found = read_stress(place, reduction, reduction.displaced(solution))
+    return found.value, found.uncertainty

@@ -40,7 +40,7 @@ def read(solved: Solved, quantity: str) -> float:
     """A quantity of a solved scene."""
     place = place_of(quantity, solved.reduction.scene)
     if place is not None:
-        return read_place(place, solved.reduction, solved.solution)
+        return read_place(place, solved.reduction, solved.solution)[0]
     return QUANTITIES[quantity](solved.reduction, solved.solution)
 
 
