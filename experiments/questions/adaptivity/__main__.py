@@ -378,7 +378,9 @@ Estimated over true error for {len(values)} meshes; {good} of them lie between .
 extrapolated value of a much finer mesh of the same sequence. A value that passes through the true one between two meshes has
 a small true error by chance, which no estimate knows of: without the meshes next to such a passage, {fine} of {len(apart)}
 lie between .5 and 4. Estimates below the true error: {sum(value < 1 for value in values)} of {len(values)}, by more than a
-factor of two: {sum(value < 0.5 for value in values)}. So the estimate is no bound.
+factor of two: {sum(value < 0.5 for value in values)}. So the estimate is no bound. All meshes of this table have linear elements and
+are compared with their own sequence. On the bearing that sequence ends about 1 % below the reference of quadratic elements
+above, which its estimates, .2 % at the end, do not see.
 
 {{effectivity}}
 

@@ -113,7 +113,7 @@ def hertz3d() -> list[dict[str, Any]]:
     rows = []
     for degree, most in ((1, 30_000),):
         local, _ = locally(ball(degree), "pressure", 2e-3, most)
-        case = Case(ball, "pressure", {1: 2})
+        case = Case(ball, "pressure", {1: 3})
         for refined, found in (("adaptive", local), ("everywhere", everywhere(case, degree, exact.peak))):
             for unknowns, value, alone, whole in found:
                 rows.append(
