@@ -27,8 +27,9 @@ import scipy.sparse as sp
 
 from contactopt.bodies.body import Assembly, build_body, reload_body
 from contactopt.bodies.elements import face_nodes
-from contactopt.bodies.fields import Fields, fields_of, recovery_error
-from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
+from contactopt.bodies.fields import Fields, fields_of, recovery_errors
+from contactopt.bodies.protocol import Equilibrium, Mesh, Region, Surface
+from contactopt.bodies.recovery import StressMap, stress_map
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.errors import InputError
@@ -208,8 +209,15 @@ class ElasticBody:
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
 
-    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
-        return recovery_error(self.body, U, W)
+    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+        return recovery_errors(self.body, U, *others)
+
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
+        dofs = self.body.basis.element_dofs
+        return np.asarray((values / np.maximum(np.bincount(dofs.ravel(), minlength=len(values)), 1))[dofs].sum(axis=0))
+
+    def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap:
+        return stress_map(self.body, region, by_poisson)
 
     def loaded(self, scene: Scene, part: Part) -> ElasticBody:
         return _at_rest(self, reload_body(self.body, scene, part))

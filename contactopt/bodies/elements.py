@@ -220,9 +220,19 @@ def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
 
 
 def elements_of(mesh: skfem.Mesh) -> tuple[str, np.ndarray]:
-    """The elements of a mesh: their name, a value of CELLS, and their nodes (e, v) in the order of VTK.
+    """List the elements of a mesh with their nodes in the order of VTK.
 
     scikit-fem sorts the corners of simplices; here they are numbered so that volumes are positive.
+
+    Parameters
+    ----------
+    mesh
+        A mesh of first or second order.
+
+    Returns
+    -------
+    tuple
+        The name of the elements, a value of CELLS, and their nodes (e, v).
     """
     nodes = np.array(mesh.dofs.element_dofs)
     if mesh.refdom.__name__ == "RefHex":

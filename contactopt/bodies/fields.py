@@ -114,8 +114,11 @@ def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.n
     return total / weight
 
 
-def recovery_error(body: Assembly, U: np.ndarray, W: np.ndarray) -> np.ndarray:
-    """Estimate for every element how much it adds to the error of the energy, or of another functional.
+def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Estimate for every element how much it adds to the error of the energy, or of other functionals.
+
+    For each other field W these are the integrals of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)).
+
 
     For every element this is the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)). s is the stress of a displacement
     and s* the continuous stress with its averages at the vertices, which is more accurate where the solution is smooth.
@@ -137,20 +140,22 @@ def recovery_error(body: Assembly, U: np.ndarray, W: np.ndarray) -> np.ndarray:
         (elements,) integrals [force length].
     """
     basis, mesh = body.basis, straight(body.basis.mesh)
-    shape = SHAPES[mesh.refdom.__name__][1][1]()
-    vertices = skfem.Basis(mesh, shape, quadrature=(basis.X, basis.W))
+    vertices = skfem.Basis(mesh, SHAPES[mesh.refdom.__name__][1][1](), quadrature=(basis.X, basis.W))
 
-    def missed(field: np.ndarray) -> np.ndarray:
-        averaged = nodal_stress(body, field, everywhere=False)[:, :, mesh.t]
-        continuous = sum(averaged[:, :, i, :, None] * np.asarray(vertices.basis[i][0]) for i in range(len(mesh.t)))
-        return np.asarray(continuous - stress_in(body, basis, field))
+    def missing(field: np.ndarray) -> np.ndarray:
+        nodal = nodal_stress(body, field, everywhere=False)
+        smooth = sum(nodal[:, :, own][..., None] * np.asarray(shape[0]) for own, shape in zip(mesh.t, vertices.basis))
+        return np.asarray(smooth - stress_in(body, basis, field))
 
-    first, second = missed(U), missed(W)
     E, nu = body.material.E, body.material.nu
-    traces = np.trace(first) * np.trace(second)
-    density = ((1 + nu) * np.sum(first * second, axis=(0, 1)) - nu * traces) / E
-    weight = weight_at(body.weight, np.asarray(basis.global_coordinates()))
-    return np.asarray(np.sum(density * basis.dx * weight, axis=1))
+    measure = basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates()))
+    first, found = missing(U), []
+    for W in others:
+        second = first if W is U else missing(W)
+        traces = np.trace(first) * np.trace(second)
+        density = ((1 + nu) * np.sum(first * second, axis=(0, 1)) - nu * traces) / E
+        found.append(np.asarray(np.sum(density * measure, axis=1)))
+    return tuple(found)
 
 
 def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:

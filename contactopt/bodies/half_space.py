@@ -223,8 +223,14 @@ class HalfSpaceBody:
     def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
         return float(force @ self.material_change(constant, U, force)[0]) / 2
 
-    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+        return (np.zeros(0),) * len(others)
+
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
         return np.zeros(0)
+
+    def stress_map(self, region: object, by_poisson: bool = False) -> None:
+        return None
 
     def energy(self, U: np.ndarray) -> float:
         force = U[self.unknowns : 2 * self.unknowns]

@@ -26,6 +26,7 @@ from contactopt.problem.coupled import BodyTerm, LocalTerm
 
 if TYPE_CHECKING:
     from contactopt.bodies.fields import Fields
+    from contactopt.bodies.recovery import StressMap
     from contactopt.problem.chart import Chart
     from contactopt.problem.convolution import Kernel
     from contactopt.problem.operators import Product
@@ -79,6 +80,18 @@ class Equilibrium:
         """The part of T C T' for a map T (rows, n) of the contact unknowns, before condensation."""
         left, right = self.low_rank
         return LocalTerm(T[:, self.free], self.stiffness, self.cycle, self.diagonal, (T @ left, T @ right))
+
+
+@dataclass(frozen=True)
+class Region:
+    """Where in a body: on a named boundary, at a point, in the circle or ball around a point, or everywhere.
+
+    boundary  its name;   point  coordinates [length];   radius  around the point [length]
+    """
+
+    boundary: str = ""
+    point: tuple[float, ...] = ()
+    radius: float | None = None
 
 
 class Equilibrated(Protocol):
@@ -469,18 +482,50 @@ class Body(Protocol):
             [force].
         """
 
-    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
-        """Compute for each element the product of the stress errors of two displacements (contactopt.bodies.fields).
+    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Compute for each element the products of the stress errors of displacements (contactopt.bodies.fields).
 
         Parameters
         ----------
-        U, W
+        U
             (n,) displacements of the body [length].
+        *others
+            Further displacements (n,).
+
+        Returns
+        -------
+        tuple of ndarray
+            For each of the others its (elements,) products with U [force length]; (0,) for a body without elements.
+        """
+
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
+        """Deal values of the displacement unknowns out evenly to the elements that have each.
+
+        Parameters
+        ----------
+        values
+            (n,) one number for each displacement of the body.
 
         Returns
         -------
         ndarray
-            (elements,) products [force length]; (0,) for a body without elements.
+            (elements,); (0,) for a body without elements.
+        """
+
+    def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap | None:
+        """Make the recovered stress in a region a linear map of the displacements (contactopt.bodies.recovery).
+
+        Parameters
+        ----------
+        region
+            Where the stress is asked for.
+        by_poisson
+            Whether the derivative of the map by Poisson's ratio is wanted instead.
+
+        Returns
+        -------
+        StressMap or None
+            None where the stress cannot be read.
         """
 
     def fields(self, U: np.ndarray) -> Fields | None:

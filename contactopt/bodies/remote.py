@@ -364,6 +364,9 @@ class RemoteBody:
         found: dict[str, tuple[np.ndarray, np.ndarray]] = self._ask(_held_by, U.kept, force)
         return found
 
+    def stress_map(self, region: object, by_poisson: bool = False) -> None:
+        return None
+
     def fields(self, U: Any) -> Fields:
         found: Fields = self._ask(_fields, U.kept)
         return found

@@ -133,8 +133,14 @@ class RigidBody:
     def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
         return 0.0
 
-    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+        return (np.zeros(0),) * len(others)
+
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
         return np.zeros(0)
+
+    def stress_map(self, region: object, by_poisson: bool = False) -> None:
+        return None
 
     def energy(self, U: np.ndarray) -> float:
         return 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 import contactopt
+from contactopt.analysis.places import PLACED
 from contactopt.analysis.quantities import QUANTITIES
 from contactopt.benchmark.keys import help_text
 from contactopt.bodies.solvers import SOLVERS
@@ -167,7 +168,9 @@ def _run(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--quantity",
         metavar="NAME",
-        help="the quantity of --accuracy: " + ", ".join(QUANTITIES) + "; NAME:PAIR is that of one pair of surfaces",
+        help="the quantity of --accuracy: "
+        + ", ".join((*QUANTITIES, *PLACED))
+        + "; NAME:PAIR is that of one pair of surfaces",
     )
     run.add_argument(
         "--adaptive", action="store_true", help="with --accuracy: refine the mesh only where the quantity needs it"
@@ -176,6 +179,15 @@ def _run(run: argparse.ArgumentParser) -> None:
         "--simplest",
         action="store_true",
         help="first leave out all that makes no error; `contactopt simplify SCENE` says what this is",
+    )
+    run.add_argument(
+        "--max-unknowns", type=int, metavar="N", help="with --accuracy: no mesh has more displacement unknowns"
+    )
+    run.add_argument(
+        "--time-limit", type=float, metavar="S", help="with --accuracy: the search ends after so many seconds"
+    )
+    run.add_argument(
+        "--max-memory", type=float, metavar="GB", help="with --accuracy: the search takes no more memory (default: 2)"
     )
     run.add_argument("--ranks", type=int, metavar="N", help="number of processes that share the bodies (needs mpi4py)")
     run.add_argument(

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.paths import PathResult
+from contactopt.analysis.places import StressReading
 from contactopt.checks import real_array
 from contactopt.derivatives.interface import Change, Dual, Sensitivity, sensitivity
 from contactopt.derivatives.kinks import Weak
@@ -43,7 +44,7 @@ class Seeds:
 
     reactions (k, dim), multipliers (p,), displacements (k, dim) of u, slip (k, dim) of u measured from the state before,
     bodies: (n,) by U of each body at fixed forces and
-    multipliers;  explicit: by a scalar parameter at fixed forces, multipliers and displacements
+    multipliers;  explicit: by a scalar parameter at fixed forces, multipliers and displacements;  stress: the reading of a stress
     """
 
     value: float
@@ -53,6 +54,7 @@ class Seeds:
     slip: Any = None
     bodies: tuple[Any, ...] = ()
     explicit: Callable[[Parameter], float] = field(default=lambda which: 0.0)
+    stress: StressReading | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from contactopt.runner import Result
 
 PAGE = "view.html"
-PICTURES = ("deformed", "maps", "pressure", "path")
+PICTURES = ("deformed", "maps", "pressure", "path", "refinement")
 STATES = "states.npz"
 MOST_NUMBERS = 3_000_000  # of the bodies at all states of a load path, above which only the last state is written
 # What a run writes beside summary.json and one VTU file per body.
@@ -81,6 +81,12 @@ def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
         from contactopt.figures.animation import path_figure
 
         save(path_figure(result.path), "path")
+    if result.estimate is not None:
+        from contactopt.adaptivity.loop import AdaptedEstimate
+        from contactopt.figures.refinement import refinement_figure
+
+        if isinstance(result.estimate, AdaptedEstimate):
+            save(refinement_figure(result.estimate), "refinement")
 
 
 def write(result: Result, folder: Path, states: bool) -> None:

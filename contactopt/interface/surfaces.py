@@ -52,6 +52,9 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
     # A component is held at a contact where supports hold it on both sides.
     own_held = mine.held[mine.unknowns[:, m.nodes]]
     other_held = np.stack([m.alone[1 - m.own] @ ~theirs.held[row] == 0 for row in theirs.unknowns])
+    mirror = sides[m.own].mirror
+    if mirror is not None:  # the other side is held as well where a plane of symmetry of both cuts it
+        other_held |= mirror[:, m.nodes]
     cells = _cells(sides[m.own], m.nodes)
     # Chart and frames, and the maps T from the displacements of both bodies in the order of the chart.
     contacts = ContactPoints(m.points, m.normals, m.areas, cells, own_held & other_held, m.gap)

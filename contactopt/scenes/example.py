@@ -55,6 +55,7 @@ tol = 1e-8
 # accuracy = 0.01               # refine plane meshes until the quantity is known to this relative error
 # quantity = "pressure"
 # adaptive = true               # only where the quantity needs it
+# max_unknowns = 50000          # bounds on the search: time_limit = 60 seconds, max_memory = 4 GB
 """
 
 

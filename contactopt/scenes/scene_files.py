@@ -23,6 +23,8 @@ from contactopt.scenes.toml_table import Table, read_table
 
 SOLVE = ("method", "normal", "tangential", "preconditioner", "Q", "solver", "quantity")  # texts, as for contactopt.run
 
+BOUNDS = ("tol", "accuracy", "time_limit", "max_memory")  # positive numbers, as for contactopt.run
+
 
 @dataclass(frozen=True)
 class SceneFile:
@@ -305,7 +307,8 @@ def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Cont
 def _solve(table: Table | None) -> dict[str, Any]:
     if table is None:
         return {}
-    found = {key: table.text(key) for key in SOLVE} | {key: table.number(key, low=0.0) for key in ("tol", "accuracy")}
+    found = {key: table.text(key) for key in SOLVE} | {key: table.number(key, low=0.0) for key in BOUNDS}
+    found["max_unknowns"] = table.take("max_unknowns", int, "a whole number")
     found["adaptive"] = table.take("adaptive", bool, "true or false")
     if (found["accuracy"] is None) != (found["quantity"] is None):
         raise table.fail("'accuracy' and 'quantity' belong together: the bound, and the name of what it bounds.")
