@@ -199,7 +199,7 @@ def _smooth_motions(problem: InterfaceProblem, degree: int) -> np.ndarray:
         low, length = chart.places.min(axis=1), np.ptp(chart.places, axis=1)
         place = (chart.places - low[:, None]) / np.where(length > 0, length, 1.0)[:, None]
         waves = [chebvander(2 * x - 1, degree).T for x in place]
-        powers = [(i,) for i in range(degree + 1)]
+        powers: list[tuple[int, ...]] = [(i,) for i in range(degree + 1)]
         if len(waves) == 2:
             powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
         functions = [np.prod([wave[i] for wave, i in zip(waves, power)], axis=0) for power in powers]
