@@ -206,8 +206,8 @@ rank and its reply; an array Q is made once, and the steps send nothing.
 {traffic}
 
 With multigrid the displacements stay on their ranks. The steps of the Krylov method send an order for each operation on them, and
-receive scalar products and traces on the interface. The number of V-cycles depends on how well the model of Q fits; it knows nothing of
-slices, so that slices are better solved with factors and an array Q:
+receive scalar products and traces on the interface. How many V-cycles slices of any height need is measured by
+`python -m experiments.questions.several_pairs`:
 
 {coupled}
 """
