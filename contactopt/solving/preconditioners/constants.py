@@ -6,6 +6,8 @@ ALONG was chosen for small condition numbers of `laplacian` on the disc of
 SOFT, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the bodies of
 `python -m experiments.questions.preconditioners` (reports/preconditioners.md). On bodies that had no part in that fit, `neumann` is
 judged by `python -m experiments.questions.preconditioners_unseen` (reports/preconditioners_unseen/report.md).
+
+WAVES and MOST_WAVES were chosen for few iterations on the slices of `python -m experiments.questions.several_pairs`.
 """
 
 SPLIT = 0.3  # Poisson's ratio of the half-space that is modelled on a surface, whatever the bodies' ratio is
@@ -13,5 +15,5 @@ ALONG = 2.0  # resistance of `laplacian` to tangential waves along their own dir
 SOFT = 0.28  # share by which bilinear elements lower the compliance of the shortest tangential waves along their own direction
 CELL = 0.45  # power of a node's cell that weights it on a surface: 1/2 where the spacing varies slowly
 EDGE = 0.2  # power of the share of the cell that an edge leaves: 0 for a half-space, 1/4 and more for a quarter-space
-WAVES = 3.0  # length of a pair of surfaces over its distance to the next pair that is worth one more degree of smooth forces
+WAVES = 3.0  # length of a pair of surfaces over its distance to the next pair that is worth one more degree of smooth motions
 MOST_WAVES = 12  # the highest degree
