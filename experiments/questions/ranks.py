@@ -188,14 +188,14 @@ solves their linear systems. Rank 0 iterates on the contact forces, and only vec
 
 Reduction and solution to a residual of 1e-8, set-up included, one BLAS thread. The critical path is the longest chain of work
 that waits for other work, in CPU seconds, from clocks that the messages carry; what else the machine was doing counts only as far
-as programs take caches and memory from each other. Efficiency is the time of one process over twice that of two ranks. The wall times are those of a machine whose two cores
-other programs used at the same time.
+as programs take caches and memory from each other. Efficiency is the time of one process over twice that of two ranks. The wall times are
+those of the same run; they also contain what the ranks sleep between two looks for a message, and the share of the cores that other
+programs take.
 
 {efficiency}
 
-The aim was 75 % in every case. What is lost are the steps on the interface, which rank 0 makes alone while the other waits: the model
-of Q in the preconditioner, the dense system, the coupling of the surfaces. Their share falls as the bodies grow in space, and
-falls slowly in the plane, where factors are cheap.
+The aim is 75 % in every case. What is lost on the critical path are the steps on the interface, which rank 0 makes alone while the
+other waits: the model of Q in the preconditioner, the dense system, the coupling of the surfaces.
 
 ## What travels
 
