@@ -14,6 +14,7 @@ from contactopt import InputError, reduce, scenes, solve
 from contactopt.bodies.ranks import mpiexec
 from contactopt.cli import main
 from contactopt.scenes.slices import sliced
+from contactopt.solving.preconditioners import degrees
 
 pytest.importorskip("mpi4py")
 ROOT = Path(__file__).parents[1]
@@ -185,3 +186,33 @@ def test_what_cannot_be_sliced_is_refused():
         sliced(scene, "floor", 2)
     with pytest.raises(InputError, match="needs at least 500 layers"):
         sliced(scene, "punch", 500)
+
+
+@pytest.mark.parametrize(
+    ("dim", "elements", "count", "options"),
+    [
+        (2, 16, 4, {"Q": "implicit", "solver": "superlu"}),
+        (2, 16, 8, {"Q": "implicit", "solver": "superlu"}),
+        (3, 4, 4, {"Q": "implicit", "solver": "superlu"}),
+        (2, 16, 4, {"solver": "multigrid"}),
+    ],
+)
+def test_thin_slices_are_solved_from_products_with_q(dim, elements, count, options):
+    """The thinnest of eight slices is a hundred times wider than high, and held by tied pairs alone."""
+    scene = scenes.flat_punch(dim, elements=elements)
+    problem = reduce(sliced(scene, "foundation", count), **options)
+    assert problem.Q.diagonal.min() >= 0.0  # signs of one pair say nothing of another
+    pieces = solve(problem, "newton", tol=1e-8, max_iterations=12)
+    whole = solve(reduce(scene, Q="explicit"), "newton", tol=1e-11)
+    assert pieces.solved
+    error = np.abs(pieces.reactions[problem.pairs[0].contacts] - whole.reactions).max()
+    assert error < 1e-6 * np.abs(whole.reactions).max()
+
+
+def test_smooth_motions_grow_with_the_length_of_a_pair_over_its_distance_to_the_next():
+    thick, thin = (
+        reduce(sliced(scenes.flat_punch(2, elements=8, foundation_height=height), "foundation", 2), Q="explicit")
+        for height in (160.0, 10.0)
+    )
+    assert degrees(reduce(scenes.flat_punch(2, elements=8))) == [1] == degrees(thick)[:1]
+    assert degrees(thin)[1] > degrees(thick)[1]

@@ -32,6 +32,7 @@ from contactopt.scenes.scene import Part, Scene
 
 ORDERS, FIRST, TICKETS = 1, 2, 30000  # tag of orders, and tags of replies: one per order, used again in turn
 SHORTEST, LONGEST = 1e-5, 1e-3  # sleep between two looks for a message [s]
+GROWTH = 1.15  # of that sleep from look to look, so that nobody waits longer than by about this share less one
 STARTED = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")  # set by mpiexec of Open MPI, and of MPICH and its kin
 OUTCOME = "CONTACTOPT_OUTCOME"  # environment variable: the file that takes the exit code of rank 0
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -293,7 +294,7 @@ def _wait(lock: threading.Lock, done: Callable[[], bool]) -> None:
             if done():
                 return
         time.sleep(pause)
-        pause = min(1.5 * pause, LONGEST)
+        pause = min(GROWTH * pause, LONGEST)
 
 
 def _mpi() -> Any:

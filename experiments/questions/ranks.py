@@ -189,13 +189,14 @@ bodies and solves their linear systems. Rank 0 iterates on the contact forces, a
 The times are those of reduction and solution to a residual of 1e-8, with the set-up and with one BLAS thread. The *critical path* is the longest
 chain of work that waits for other work. It is measured in CPU seconds, by clocks that the messages carry. Other programs influence it only as far
 as programs take caches and memory from each other. *Efficiency* is the time of one process over twice that of two ranks. The wall times are
-those of a machine whose two cores other programs used at the same time.
+those of the same run. They also contain what the ranks sleep between two looks for a message, and the share of the cores that other
+programs take.
 
 {efficiency}
 
-The aim was 75 % in every case. The time that is lost is that of the steps on the interface. Rank 0 makes these steps alone while the other rank waits: the
-model of Q in the preconditioner, the dense system, the coupling of the surfaces. In three dimensions their share falls as the bodies grow. In the plane
-it falls slowly, because the factors of plane bodies are cheap.
+The aim is 75 % in every case. The time that is lost on the critical path is that of the steps on the interface. Rank 0 makes these steps
+alone while the other rank waits: the model of Q in the preconditioner, the dense system, the coupling of the surfaces.
+
 
 ## What travels
 
@@ -205,9 +206,10 @@ and its reply. An array Q is made once, and then the steps send nothing.
 
 {traffic}
 
-With multigrid the displacements stay on their ranks. The steps of the Krylov method (an iteration such as conjugate gradients) send an order for each operation on them, and
-receive scalar products and displacements on the interface. The number of V-cycles depends on how well the model of Q fits. This model
-does not contain slices. Therefore slices are better solved with factors and an array Q:
+With multigrid the displacements stay on their ranks. The steps of the Krylov method (an iteration such as conjugate gradients) send an
+order for each operation on them, and receive scalar products and displacements on the interface. How many V-cycles slices of any height
+need is measured by `python -m experiments.questions.several_pairs`:
+
 
 {coupled}
 """

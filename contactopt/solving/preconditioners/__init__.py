@@ -170,7 +170,7 @@ def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Precondit
 
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
-    """Write smooth forces on every pair of surfaces as columns: polynomials of the place, in every component.
+    """Write smooth motions on every pair of surfaces as columns: polynomials of the place, in every component.
 
     On a pair that is far from all others they are constant and linear. Forces whose waves are longer than the distance to the
     next pair reach it through the body in between, which no model of one pair knows. A thin slice of a body bends
@@ -191,7 +191,7 @@ def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
 
 
 def degrees(problem: InterfaceProblem) -> list[int]:
-    """The degree of the smooth forces on each pair of surfaces.
+    """The degree of the smooth motions of each pair of surfaces.
 
     The distance between two pairs is the median over the contacts of one of them, so that pairs that meet at a corner are
     not taken for neighbours along all of their length.
@@ -209,8 +209,8 @@ def degrees(problem: InterfaceProblem) -> list[int]:
 def _smooth_motions(problem: InterfaceProblem, degree: int) -> np.ndarray:
     """(k dim, j): polynomials of the place up to a degree, those of Chebyshev, in every component.
 
-    On a closed line, which has no polynomials, cosines and sines take their place. Components that cannot move carry no force;
-    what is then no force of its own is left out.
+    On a closed line, which has no polynomials, cosines and sines take their place. Components that cannot move stay at rest;
+    what is then no motion of its own is left out.
     """
     chart = problem.chart
     if chart.period is not None:

@@ -9,6 +9,8 @@ EIGENVECTORS was chosen by the times of both ways on surfaces of 300 to 2,000 un
 DISPERSION, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the bodies of
 `python -m experiments.questions.preconditioners` (reports/preconditioners.md). On bodies that had no part in that fit, `neumann` is
 judged by `python -m experiments.questions.preconditioners_unseen` (reports/preconditioners_unseen/report.md).
+
+WAVES and MOST_WAVES were chosen for few iterations on the slices of `python -m experiments.questions.several_pairs`.
 """
 
 SPLIT = 0.3  # Poisson's ratio of the half-space that is modelled on a surface, whatever the bodies' ratio is
@@ -20,5 +22,5 @@ EIGENVECTORS = 1200  # unknowns of a surface up to which `laplacian` takes its i
 PIECE = 0.25  # shift over the least eigenvalue of a piece of the surface that is as long as this one
 THINNEST = 1e-2  # nodal area over mass, relative to the mean, of a contact on an axis
 DISTORTED = 2.0  # area of a cell in the chart over that in space, or one over it, beyond which the chart has no directions there
-WAVES = 3.0  # length of a pair of surfaces over its distance to the next pair that is worth one more degree of smooth forces
+WAVES = 3.0  # length of a pair of surfaces over its distance to the next pair that is worth one more degree of smooth motions
 MOST_WAVES = 12  # the highest degree
