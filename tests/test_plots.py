@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import two_blocks
@@ -44,8 +46,6 @@ def test_a_rigid_punch_is_drawn_with_its_exact_curve():
 
 
 def test_triangles_and_convergence_are_drawn():
-    from dataclasses import replace
-
     base = two_blocks("plane-strain", mu=0.3)
     up = base.upper.mesh.to_meshtri()
     up = up.with_boundaries({"top": lambda x: x[1] == 1, "bottom": lambda x: x[1] == 0, "side0": lambda x: x[0] == 0})
@@ -85,3 +85,14 @@ def test_the_picture_of_a_solid_has_its_colours_and_its_outline():
     middles = left + (np.arange(3, 99) + 0.5) * (right - left) / 102
     assert np.allclose(inner, middles) and np.allclose(image[1, 3:-3, 0], middles * 0.65)
     assert bottom == pytest.approx(-0.01) and top == pytest.approx(1.01)
+
+
+def test_a_solid_whose_displacements_are_no_numbers_is_drawn_at_rest():
+    result = run("punch-3d", elements=2)
+    far = [
+        replace(f, displacement=np.full_like(f.displacement, value))
+        for f, value in zip(result.fields, (np.nan, np.inf))
+    ]
+    ax = plots.deformed(result.scene, result.problem, far)
+    left, right, bottom, top = ax.images[0].get_extent()
+    assert np.all(np.isfinite([left, right, bottom, top])) and right - left < 300

@@ -158,7 +158,8 @@ def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float
     shade, view = ScalarMappable(Normalize(0, top), "viridis"), View(ELEVATION, AZIMUTH)
     drawn = []
     for f in fields:
-        points = (f.mesh.p + scale * f.displacement).T
+        move = np.nan_to_num(f.displacement, posinf=0.0, neginf=0.0)  # of bodies that fly away, which are drawn at rest
+        points = (f.mesh.p + scale * move).T
         plane, faces = surface(*elements_of(f.mesh), points)
         cells = triangles(pieces(plane, faces))
         opposite = np.stack([cells[:, [1, 2]], cells[:, [2, 0]], cells[:, [0, 1]]], axis=1)
