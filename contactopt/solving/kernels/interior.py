@@ -66,12 +66,8 @@ def interior_iterates(
     path = path or Path()
     full = path.full
     k, d = problem.q.shape
-    mu = np.where(problem.mu < SMOOTH, 1.0, np.minimum(problem.mu, ROUGH))
-    smooth = problem.mu < SMOOTH
-    scale = np.ones((k, d))
-    scale[:, 0] = 1 / mu  # r = scale x, z = scale (u + mu |u_t| n)
-    kept = np.ones((k, d), dtype=bool)
-    kept[smooth, 1:] = False
+    scale, kept = lorentz(problem)
+    smooth = ~kept[:, 1]
     flat, V, p = kept.ravel(), problem.V, len(problem.s)
     x, z, lam = np.zeros((k, d)), np.zeros((k, d)), np.zeros(p)
     x[:, 0], z[:, 0] = path.first
@@ -90,7 +86,7 @@ def interior_iterates(
         best = min(best, error)
         if error < NEAR or since >= STALLED or not np.isfinite(error):
             return
-        scaling = _Scaling(x, z)
+        scaling = Scaling(x, z)
         bend = 1.0 if full or last > STUCK else 0.0
         shear = np.broadcast_to(np.eye(d), (k, d, d)).copy()
         shear[:, 0, 1:] = np.where(smooth[:, None], 0.0, -bend * z[:, 1:] / slip[:, None])
@@ -99,31 +95,40 @@ def interior_iterates(
         if solve is None:
             return
 
-        direction = partial(_direction, solve, scaling, shear, gap, scale, kept, V, unbalanced)
-        first = direction(-z)
+        towards = partial(direction, solve, scaling, shear, gap, scale, kept, V, unbalanced)
+        first = towards(-z)
         if first is None:
             return
         length = min(1.0, 0.99 * scaling.longest(first[0], first[1]))
         ahead = float(np.sum((x + length * first[0]) * (z + length * first[1]))) / k
         centering = float(np.clip(np.clip(ahead / mean, 0.0, 1.0) ** 3, 1e-4 if bend else 0.1, 0.95))
         second = scaling.corrector(first[0], first[1]) if length > 0.1 else 0.0
-        step = direction(centering * mean * scaling.inverse - z - second)
+        step = towards(centering * mean * scaling.inverse - z - second)
         if step is None:
             return
         length = min(1.0, (SHORT if full else BOUNDARY) * scaling.longest(step[0], step[1]))
         least = np.minimum(CENTRAL, 0.5 * scaling.centrality / mean)
         for _ in range(30):
             new = x + length * step[0], z + length * step[1]
-            if np.all(np.sqrt(np.maximum(_det(new[0]) * _det(new[1]), 0.0)) >= least * np.sum(new[0] * new[1]) / k):
+            if np.all(np.sqrt(np.maximum(det(new[0]) * det(new[1]), 0.0)) >= least * np.sum(new[0] * new[1]) / k):
                 break
             length *= 0.8
         last = length
         x, z, lam = new[0], new[1], lam + length * step[2]
 
 
-def _direction(
+def lorentz(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
+    """scale (k, d) with r = scale x and z = scale (u + mu |u_t| n), and the mask kept (k, d) of what friction leaves free."""
+    scale, kept = np.ones(problem.q.shape), np.ones(problem.q.shape, dtype=bool)
+    smooth = problem.mu < SMOOTH
+    scale[:, 0] = 1 / np.where(smooth, 1.0, np.minimum(problem.mu, ROUGH))
+    kept[smooth, 1:] = False
+    return scale, kept
+
+
+def direction(
     solve: Solver,
-    scaling: _Scaling,
+    scaling: Scaling,
     shear: np.ndarray,
     gap: np.ndarray,
     scale: np.ndarray,
@@ -134,23 +139,23 @@ def _direction(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """dx, dz (k, d) and dlambda (p,) with F dx + dz = target and the linearised equations; None if there are none."""
     flat = kept.ravel()
-    right = ((_times(shear, target) - gap) / scale).ravel()[flat]
+    right = ((times(shear, target) - gap) / scale).ravel()[flat]
     answer = bordered(solve, right, V[flat], V[flat], -unbalanced)
     if answer is None:
         return None
     dr = np.zeros(kept.size)
     dr[flat] = answer[0]
     dx = dr.reshape(kept.shape) / scale
-    return dx, np.where(kept, target - _times(scaling.F, dx), 0.0), answer[1]
+    return dx, np.where(kept, target - times(scaling.F, dx), 0.0), answer[1]
 
 
-class _Scaling:
+class Scaling:
     """Nesterov and Todd's scaling of points x, z (k, d) inside Lorentz's cones: F = M M with M x = M^-1 z."""
 
     def __init__(self, x: np.ndarray, z: np.ndarray):
         d = x.shape[1]
         self.x, self.z, self.sign = x, z, np.where(np.arange(d) == 0, 1.0, -1.0)
-        det_x, det_z = _det(x), _det(z)
+        det_x, det_z = det(x), det(z)
         unit_x, unit_z = x / np.sqrt(det_x)[:, None], z / np.sqrt(det_z)[:, None]
         w = unit_z + self.sign * unit_x
         w /= np.sqrt(2 * (1 + np.sum(unit_x * unit_z, axis=1)))[:, None]
@@ -167,29 +172,29 @@ class _Scaling:
 
     def corrector(self, dx: np.ndarray, dz: np.ndarray) -> np.ndarray:
         """Mehrotra's second-order term of the predictor (dx, dz), in the units of z."""
-        a, b, c = _times(self.M, dx), _times(self.M_inverse, dz), _times(self.M, self.x)
+        a, b, c = times(self.M, dx), times(self.M_inverse, dz), times(self.M, self.x)
         product = np.concatenate([np.sum(a * b, axis=1)[:, None], a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:]], axis=1)
         out = np.empty_like(product)
-        out[:, 0] = (c[:, 0] * product[:, 0] - np.sum(c[:, 1:] * product[:, 1:], axis=1)) / _det(c)
+        out[:, 0] = (c[:, 0] * product[:, 0] - np.sum(c[:, 1:] * product[:, 1:], axis=1)) / det(c)
         out[:, 1:] = (product[:, 1:] - out[:, :1] * c[:, 1:]) / c[:, :1]
-        return _times(self.M, out)
+        return times(self.M, out)
 
     def longest(self, dx: np.ndarray, dz: np.ndarray) -> float:
         """The longest step that keeps both points in the cones."""
         return min(_longest(self.x, dx), _longest(self.z, dz))
 
 
-def _times(A: np.ndarray, x: np.ndarray) -> np.ndarray:
+def times(A: np.ndarray, x: np.ndarray) -> np.ndarray:
     return np.asarray((A @ x[:, :, None])[:, :, 0])
 
 
-def _det(x: np.ndarray) -> np.ndarray:
+def det(x: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(x[:, 1:], axis=1)
     return np.asarray((x[:, 0] - length) * (x[:, 0] + length))
 
 
 def _longest(x: np.ndarray, dx: np.ndarray) -> float:
-    a, c = _det(dx), np.maximum(_det(x), 0.0)
+    a, c = det(dx), np.maximum(det(x), 0.0)
     b = 2 * (x[:, 0] * dx[:, 0] - np.sum(x[:, 1:] * dx[:, 1:], axis=1))
     square = b * b - 4 * a * c
     root = -0.5 * (b + np.where(b >= 0, 1.0, -1.0) * np.sqrt(np.maximum(square, 0.0)))
