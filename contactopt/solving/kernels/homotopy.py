@@ -14,9 +14,9 @@ by its length, t rises where it has to, and the end is a solution. slip is smoot
 and the end solves Coulomb's problem as it is: where a contact sticks z = 0, where it slips z_n = |z_t|, and where it is open
 u_n = z_n - slip(z) >= 0 as long as z_n >= |z_t|. Each step goes along the tangent, and Newton steps across it lead back to
 the path; both come from one factorisation. The sign of the determinant tells forward from backward: where it changes, t
-begins to rise or fall. For elastic and for rigid bodies whose overlaps can be removed, the path is bounded for all t > 0, and
-unless it has singular points, which almost no c makes, it ends at t = 0. Lemke's method follows such a path for polygonal
-cones.
+begins to rise or fall. The path cannot come back to t = 1, where the first point is the only solution. As long as it stays
+bounded it ends at t = 0, unless it has singular points, which almost every c avoids. That it stays bounded is not proved here,
+and a step that is too long may land on another path. Lemke's method follows such a path for polygonal cones.
 Source: Kellogg, Li, Yorke (1976), A constructive proof of the Brouwer fixed-point theorem and computational results;
 Allgower, Georg (1990), Numerical Continuation Methods, chapters 2 to 6; Acary, Cadoux, Lemarechal, Malick (2011) for existence.
 """
@@ -36,10 +36,10 @@ from contactopt.solving.kernels.interior import RIDGE, Iterate, Scaling, det, di
 from contactopt.solving.kernels.sparse_blocks import Blocks, Solver
 
 BEND = 0.5  # between 0, where slip has a kink at z_t = 0, and 1, where nothing is left of friction
-NEAR, FAR = 0.2, 0.7  # Newton steps, over the point: on the path, and beyond which a step along it was too long
+NEAR, FAR = 0.4, 0.8  # Newton steps, over the point: on the path, and beyond which a step along it was too long
 SLOW = 0.6  # a Newton step that is longer than this share of the last one does not converge
 MOST = 6  # Newton steps back to the path
-AIM = 0.35  # first Newton step that the length of the next step along the path aims at
+AIM = 0.25  # first Newton step that the length of the next step along the path aims at
 FIRST, LONGEST, SHORTEST = 0.3, 3.0, 1e-8  # steps along the path, as the largest relative change of a contact
 GROWTH, AGAIN, CUT = 3.0, 1.5, 0.35  # largest growth of the step, the same after one that failed, and the cut then
 LEAST, SHRINK = 0.1, 0.7  # of t that one step leaves, and of a step that would leave the cones
