@@ -28,7 +28,7 @@ from experiments.report import write  # noqa: E402
 HOME = "contactopt.solving"
 USERS = {  # names of constants -> module that uses them, method that is run, kinds of problems that feel them
     (
-        "NEWTON_STEPS PATIENCE PROGRESS CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND PATHS GENTLE_ALPHA LARGER"
+        "NEWTON_STEPS PATIENCE PROGRESS CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND PATHS TURNING GENTLE_ALPHA LARGER"
     ): (
         "methods.auto",
         "auto",

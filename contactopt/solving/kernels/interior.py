@@ -97,13 +97,8 @@ def interior_iterates(
     path = path or Path()
     full = path.full
     k, d = problem.q.shape
-    # A contact without friction has the normal component alone; its other components leave the system.
-    mu = np.where(problem.mu < FRICTIONLESS, 1.0, np.minimum(problem.mu, ROUGHEST))
-    smooth = problem.mu < FRICTIONLESS
-    scale = np.ones((k, d))
-    scale[:, 0] = 1 / mu  # r = scale x, z = scale (u + mu |u_t| n)
-    kept = np.ones((k, d), dtype=bool)
-    kept[smooth, 1:] = False
+    scale, kept = lorentz(problem)
+    smooth = ~kept[:, 1]
     flat, V, p = kept.ravel(), problem.V, len(problem.s)
     # The first point lies on the axes of both cones, so that it is in their middle.
     x, z, lam = np.zeros((k, d)), np.zeros((k, d)), np.zeros(p)
@@ -126,7 +121,7 @@ def interior_iterates(
             return
         # Linearise |u_t| = |z_t|: `shear` is the derivative of z - |z_t| n by z. The scaling gives dz = target - F dx.
         # Put in, the system for dr is (Q + shear F / scale^2) dr + V dlambda = right, with one block added per contact.
-        scaling = _Scaling(x, z)
+        scaling = Scaling(x, z)
         bend = 1.0 if full or last > STUCK else 0.0
         shear = np.broadcast_to(np.eye(d), (k, d, d)).copy()
         shear[:, 0, 1:] = np.where(smooth[:, None], 0.0, -bend * z[:, 1:] / slip[:, None])
@@ -135,9 +130,9 @@ def interior_iterates(
         if solve is None:
             return
 
-        direction = partial(_direction, solve, scaling, shear, gap, scale, kept, V, unbalanced)
+        towards = partial(direction, solve, scaling, shear, gap, scale, kept, V, unbalanced)
         # Predictor: the step towards complementarity zero, as far as it stays in the cones.
-        first = direction(-z)
+        first = towards(-z)
         if first is None:
             return
         length = min(1.0, PREDICTED * scaling.longest(first[0], first[1]))
@@ -148,7 +143,7 @@ def interior_iterates(
         )
         # Corrector: the same system with the centring and the second-order term of the predictor.
         second = scaling.corrector(first[0], first[1]) if length > CORRECTED else 0.0
-        step = direction(centering * mean * scaling.inverse - z - second)
+        step = towards(centering * mean * scaling.inverse - z - second)
         if step is None:
             return
         length = min(1.0, (SHORT if full else BOUNDARY) * scaling.longest(step[0], step[1]))
@@ -156,16 +151,25 @@ def interior_iterates(
         least = np.minimum(CENTRAL, CENTRAL_KEPT * scaling.centrality / mean)
         for _ in range(BACKTRACKS):
             new = x + length * step[0], z + length * step[1]
-            if np.all(np.sqrt(np.maximum(_det(new[0]) * _det(new[1]), 0.0)) >= least * np.sum(new[0] * new[1]) / k):
+            if np.all(np.sqrt(np.maximum(det(new[0]) * det(new[1]), 0.0)) >= least * np.sum(new[0] * new[1]) / k):
                 break
             length *= BACKTRACK
         last = length
         x, z, lam = new[0], new[1], lam + length * step[2]
 
 
-def _direction(
+def lorentz(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
+    """scale (k, d) with r = scale x and z = scale (u + mu |u_t| n), and the mask kept (k, d) of what friction leaves free."""
+    scale, kept = np.ones(problem.q.shape), np.ones(problem.q.shape, dtype=bool)
+    smooth = problem.mu < FRICTIONLESS
+    scale[:, 0] = 1 / np.where(smooth, 1.0, np.minimum(problem.mu, ROUGHEST))
+    kept[smooth, 1:] = False
+    return scale, kept
+
+
+def direction(
     solve: Solver,
-    scaling: _Scaling,
+    scaling: Scaling,
     shear: np.ndarray,
     gap: np.ndarray,
     scale: np.ndarray,
@@ -178,7 +182,7 @@ def _direction(
     flat = kept.ravel()
     # Put dz = target - F dx into the linearised z = scale (u + mu |u_t| n); what remains are equations for dr and
     # dlambda.
-    right = ((_times(shear, target) - gap) / scale).ravel()[flat]
+    right = ((times(shear, target) - gap) / scale).ravel()[flat]
     answer = bordered(solve, right, V[flat], V[flat], -unbalanced)
     if answer is None:
         return None
@@ -186,17 +190,17 @@ def _direction(
     dr = np.zeros(kept.size)
     dr[flat] = answer[0]
     dx = dr.reshape(kept.shape) / scale
-    return dx, np.where(kept, target - _times(scaling.F, dx), 0.0), answer[1]
+    return dx, np.where(kept, target - times(scaling.F, dx), 0.0), answer[1]
 
 
-class _Scaling:
+class Scaling:
     """Nesterov and Todd's scaling of points x, z (k, d) inside Lorentz's cones: F = M M with M x = M^-1 z."""
 
     def __init__(self, x: np.ndarray, z: np.ndarray):
         d = x.shape[1]
         self.x, self.z, self.sign = x, z, np.where(np.arange(d) == 0, 1.0, -1.0)
         # Both points divided by the root of their determinant lie on the hyperboloid det = 1.
-        det_x, det_z = _det(x), _det(z)
+        det_x, det_z = det(x), det(z)
         unit_x, unit_z = x / np.sqrt(det_x)[:, None], z / np.sqrt(det_z)[:, None]
         # The scaling point w lies half-way between z and the inverse of x; F is the quadratic map of w, times the ratio
         # of sizes.
@@ -218,30 +222,30 @@ class _Scaling:
         """Mehrotra's second-order term of the predictor (dx, dz), in the units of z."""
         # In scaled variables x and z are one point c. With the product o of Jordan's algebra the term y solves c o y =
         # dx o dz.
-        a, b, c = _times(self.M, dx), _times(self.M_inverse, dz), _times(self.M, self.x)
+        a, b, c = times(self.M, dx), times(self.M_inverse, dz), times(self.M, self.x)
         product = np.concatenate([np.sum(a * b, axis=1)[:, None], a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:]], axis=1)
         # The product with c is an arrow matrix, which is solved by elimination.
         out = np.empty_like(product)
-        out[:, 0] = (c[:, 0] * product[:, 0] - np.sum(c[:, 1:] * product[:, 1:], axis=1)) / _det(c)
+        out[:, 0] = (c[:, 0] * product[:, 0] - np.sum(c[:, 1:] * product[:, 1:], axis=1)) / det(c)
         out[:, 1:] = (product[:, 1:] - out[:, :1] * c[:, 1:]) / c[:, :1]
-        return _times(self.M, out)
+        return times(self.M, out)
 
     def longest(self, dx: np.ndarray, dz: np.ndarray) -> float:
         """The longest step that keeps both points in the cones."""
         return min(_longest(self.x, dx), _longest(self.z, dz))
 
 
-def _times(A: np.ndarray, x: np.ndarray) -> np.ndarray:
+def times(A: np.ndarray, x: np.ndarray) -> np.ndarray:
     return np.asarray((A @ x[:, :, None])[:, :, 0])
 
 
-def _det(x: np.ndarray) -> np.ndarray:
+def det(x: np.ndarray) -> np.ndarray:
     length = np.linalg.norm(x[:, 1:], axis=1)
     return np.asarray((x[:, 0] - length) * (x[:, 0] + length))
 
 
 def _longest(x: np.ndarray, dx: np.ndarray) -> float:
-    a, c = _det(dx), np.maximum(_det(x), 0.0)
+    a, c = det(dx), np.maximum(det(x), 0.0)
     b = 2 * (x[:, 0] * dx[:, 0] - np.sum(x[:, 1:] * dx[:, 1:], axis=1))
     square = b * b - 4 * a * c
     root = -0.5 * (b + np.where(b >= 0, 1.0, -1.0) * np.sqrt(np.maximum(square, 0.0)))

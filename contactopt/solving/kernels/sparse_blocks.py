@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from contactopt.problem.operators import Interface
@@ -21,7 +23,20 @@ from contactopt.solving.constants import FULL, SMALL
 
 PIVOT = 0.01  # a diagonal entry this much smaller than the largest of its column is still a pivot
 
-Solver = Callable[[np.ndarray], np.ndarray]  # right-hand sides (m, j) -> x (m, j)
+
+@dataclass(frozen=True)
+class Solver:
+    """A factorised block system.
+
+    apply  right-hand sides (m, j) -> x (m, j)
+    sign   -> sign of the determinant, 1 or -1
+    """
+
+    apply: Callable[[np.ndarray], np.ndarray]
+    sign: Callable[[], float]
+
+    def __call__(self, right: np.ndarray) -> np.ndarray:
+        return self.apply(right)
 
 
 class DenseBlocks:
@@ -45,7 +60,13 @@ class DenseBlocks:
                 factors = la.lu_factor(A if kept.all() else A[np.ix_(kept, kept)], overwrite_a=True, check_finite=False)
             except (la.LinAlgError, ValueError):
                 return None
-        return lambda right: np.asarray(la.lu_solve(factors, right, check_finite=False))
+        lu, swapped = factors
+
+        def sign() -> float:
+            swaps = np.count_nonzero(swapped != np.arange(len(lu)))
+            return float(np.prod(np.sign(np.diagonal(lu))) * (-1.0) ** swaps)
+
+        return Solver(lambda right: np.asarray(la.lu_solve(factors, right, check_finite=False)), sign)
 
 
 class SparseBlocks:
@@ -110,10 +131,21 @@ class SparseBlocks:
             x[index] = factors.solve(np.ascontiguousarray(right[index]))
             return x
 
-        return solve
+        def sign() -> float:
+            pivots = float(np.prod(np.sign(factors.U.diagonal())))
+            return pivots * _parity(factors.perm_r) * _parity(factors.perm_c)
+
+        return Solver(solve, sign)
 
 
 Blocks = DenseBlocks | SparseBlocks
+
+
+def _parity(order: np.ndarray) -> int:
+    """1 for an even permutation, -1 for an odd one: by its cycles."""
+    n = len(order)
+    cycles = connected_components(sp.csr_array((np.ones(n), (np.arange(n), order)), shape=(n, n)))[0]
+    return -1 if (n - cycles) % 2 else 1
 
 
 def block_matrix(Q: Interface, d: int) -> Blocks:
