@@ -5,9 +5,9 @@
    falls. Elastic bodies end here (reports/newton_steps), each step one dense linear system.
 2. The interior-point method (contactopt.solving.kernels.interior), which no cycle and no rank deficiency of Q disturbs,
    and a few steps of the proximal loop for the last digits. They need no symmetric Q and no backend.
-3. Where these fail and Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point, convex programs.
-   Where that fails too, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
-4. The path that turns back where it must (contactopt.solving.kernels.homotopy), at most TURNING linear systems of it.
+   Where these fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
+3. The path that turns back where it must (contactopt.solving.kernels.homotopy), at most TURNING linear systems of it.
+4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point, convex programs.
 5. Where Q is sparse: interior-point paths drawn at random, PATHS of them, since one that ends early says nothing of the next;
    then the proximal loop from the best of all points, its weight falling slowly: jammed packings need hundreds of steps.
    When SPARSE_ROUND of them have not halved the residual, the same again on other paths, with twice the patience.
@@ -109,13 +109,13 @@ class Auto:
                 reached = yield from self._interior(
                     problem, matrix, reached, interior_iterates(problem, matrix, Path(full))
                 )
-            if problem.symmetric and not sp.issparse(problem.Q):
-                reached = yield from self._cones(problem, reached)
         if infeasibility(problem) is not None:  # the driver says so
             return
         if interior:
             turning = homotopy_iterates(problem, matrix, TURNING)
             reached = yield from self._interior(problem, matrix, reached, turning)
+            if problem.symmetric and not sp.issparse(problem.Q):
+                reached = yield from self._cones(problem, reached)
         if sp.issparse(problem.Q):
             yield from self._jammed(problem, matrix, reached)
             return
