@@ -19,6 +19,9 @@ def main() -> int:
     except KeyboardInterrupt:
         print("contactopt: interrupted", file=sys.stderr)
         code = INTERRUPTED
+    except BrokenPipeError:  # the program that reads the output, such as `head`, wants no more of it
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 0
     if code == INTERRUPTED:
         # CPython ends itself by SIGINT instead, if the interrupt came within exec() of a text, as dataclasses use it.
         sys.stdout.flush()

@@ -14,7 +14,24 @@ LONGEST_NAME = 100  # characters
 
 
 def check_number(name: str, value: float, low: float = -np.inf, high: float = np.inf, closed: bool = False) -> None:
-    """Raise InputError unless value is a finite number in (low, high), or in [low, high) when `closed`."""
+    """Check that a value is a finite number in (low, high), or in [low, high) when `closed`.
+
+    Parameters
+    ----------
+    name
+        What the value is, in the words of the message.
+    value
+        What the user gave.
+    low, high
+        The bounds, which are infinite unless given.
+    closed
+        Whether the lower bound itself is allowed.
+
+    Raises
+    ------
+    InputError
+        If the value is no number, is not finite, or lies outside the bounds. Text and masked values are no numbers.
+    """
     try:
         good = isfinite(value) and (low <= value if closed else low < value) and value < high
     except (TypeError, ValueError, OverflowError):
@@ -29,7 +46,20 @@ def check_number(name: str, value: float, low: float = -np.inf, high: float = np
 
 
 def given(value: Any) -> bool:
-    """Whether an optional array is there; one that no array can be made of is there, and is refused by `real_array`."""
+    """Say whether an optional array was given.
+
+    What no array can be made of counts as given; `real_array` refuses it.
+
+    Parameters
+    ----------
+    value
+        An array, a number, a list, or an empty array where nothing was given.
+
+    Returns
+    -------
+    bool
+        True if the value has at least one entry.
+    """
     try:
         return np.size(value) > 0
     except ValueError:
@@ -37,19 +67,61 @@ def given(value: Any) -> bool:
 
 
 def check_positive(**sizes: float) -> None:
-    """Raise InputError unless every size is a positive finite number."""
+    """Check that every size is a positive finite number.
+
+    Parameters
+    ----------
+    sizes
+        The values by their names, in which _ stands for a space in the message.
+
+    Raises
+    ------
+    InputError
+        If a size is no number, not finite, or not positive.
+    """
     for name, value in sizes.items():
         check_number(name.replace("_", " "), value, low=0.0)
 
 
 def check_count(name: str, value: int) -> None:
-    """Raise InputError unless the value is a whole number of at least 1."""
+    """Check that a value is a whole number of at least 1.
+
+    Parameters
+    ----------
+    name
+        What the value is, in the words of the message.
+    value
+        What the user gave.
+
+    Raises
+    ------
+    InputError
+        If the value is no integer or is less than 1. True and False are no integers here.
+    """
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
         raise InputError(f"{name} must be a whole number of at least 1; got {value!r}.")
 
 
 def real_array(name: str, value: Any) -> np.ndarray:
-    """A copy of the value as an array of finite floats; InputError on text, ragged lists, complex or missing numbers."""
+    """Copy a value into an array of finite floats.
+
+    Parameters
+    ----------
+    name
+        What the value is, in the words of the message.
+    value
+        A number, a list of any depth, or an array.
+
+    Returns
+    -------
+    ndarray
+        The numbers in the shape of the value. They are a copy.
+
+    Raises
+    ------
+    InputError
+        On text, on rows of different lengths, on complex numbers, and on numbers that are not finite.
+    """
     try:
         array = np.asarray(value)
     except ValueError as error:
@@ -65,11 +137,23 @@ def real_array(name: str, value: Any) -> np.ndarray:
 
 
 def check_name(what: str, name: object) -> None:
-    """Raise InputError unless the name can become a file's name in a folder, and can lead to no other folder.
+    """Check that a name can become a file's name in a folder, and can lead to no other folder.
 
     Refused are names that are no text, empty, longer than 100 characters, or made of dots only; names with a slash, a
     backslash, a colon or a character that cannot be printed; names that begin or end with a space; and the device
     names of Windows.
+
+    Parameters
+    ----------
+    what
+        What the name belongs to, in the words of the message.
+    name
+        The name that the user gave.
+
+    Raises
+    ------
+    InputError
+        If the name is refused.
     """
     wrong = ""
     if not isinstance(name, str):
@@ -89,6 +173,19 @@ def check_name(what: str, name: object) -> None:
 
 
 def short(value: object, most: int = 60) -> str:
-    """The value as Python writes it, with its middle left out if that is longer than `most` characters."""
+    """Write a value as Python does, with its middle left out if that is long.
+
+    Parameters
+    ----------
+    value
+        Any object.
+    most
+        How many characters may stay as they are. A longer text becomes three quarters of this and three dots.
+
+    Returns
+    -------
+    str
+        The text for a message.
+    """
     text = repr(value)
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"

@@ -13,7 +13,18 @@ from contactopt.errors import InputError
 
 
 def check_folder(out: Path) -> None:
-    """Raise InputError unless files can be put into the folder `out`, which may not exist yet. It leaves nothing behind."""
+    """Check that files can be put into a folder, which may not exist yet. Nothing is left behind.
+
+    Parameters
+    ----------
+    out
+        The folder.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made or written to.
+    """
     existing = out
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
@@ -28,16 +39,32 @@ def check_folder(out: Path) -> None:
 
 @contextmanager
 def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
-    """An empty folder to write files into, which move to the folder `out` together when the block ends without an error.
+    """Give an empty folder to write files into, which move to the folder `out` together when the block ends without an
+    error.
 
-    The files in `out` whose names are in `stale` and that the block did not write are removed then. After an error `out`
-    holds what it held before, and a folder that was made for it is gone. Raises InputError where the operating system
-    refuses to write.
+    After an error `out` holds what it held before, and a folder that was made for it is gone.
+
+    Parameters
+    ----------
+    out
+        The folder where the files shall be in the end. It is made if it does not exist.
+    stale
+        Names of files that are removed from `out` unless the block wrote them anew.
+
+    Yields
+    ------
+    Path
+        The empty folder, inside `out`.
+
+    Raises
+    ------
+    InputError
+        Where the operating system refuses to write.
     """
     out = Path(out)
     made: list[Path] = []
     try:
-        made = make_folder(out)
+        made = _make_folder(out)
         with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=out) as staging:
             yield Path(staging)
             written = sorted(Path(staging).iterdir())
@@ -47,15 +74,27 @@ def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
     except OSError as error:
         raise _unwritable(out, error) from error
     finally:
-        remove_empty(made)
+        _remove_empty(made)
 
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """A path to write one file to, which replaces `path` when the block ends without an error.
+    """Give a path to write one file to, which replaces `path` when the block ends without an error.
 
-    It has the ending of `path`, from which many writers take their format. Raises InputError where the operating system
-    refuses to write.
+    Parameters
+    ----------
+    path
+        Where the file shall be in the end.
+
+    Yields
+    ------
+    Path
+        The path to write to. It has the name of `path`, from whose ending many writers take their format.
+
+    Raises
+    ------
+    InputError
+        Where the operating system refuses to write.
     """
     path = Path(path)
     with whole_folder(path.parent) as staging:
@@ -65,8 +104,16 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     """Let `write` fill a temporary file in a hidden folder beside `path`, then give it the name `path`.
 
-    The file has the ending of `path`, from which many writers take their format. A symbolic link at `path` is replaced, not
-    followed. When writing fails, the error goes on and nothing is left behind.
+    A symbolic link at `path` is replaced, not followed. When writing fails, the error goes on and nothing is left
+    behind.
+
+    Parameters
+    ----------
+    path
+        Where the file shall be in the end. Its folder is made if it does not exist.
+    write
+        A function of a path that writes the file there. The path has the ending of `path`, from which many writers take
+        their format.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=path.parent) as staging:
@@ -79,14 +126,14 @@ def _unwritable(out: Path, error: OSError) -> InputError:
     return InputError(f"cannot write into '{out}': {error.strerror or error}; choose another output directory.")
 
 
-def make_folder(folder: Path) -> list[Path]:
+def _make_folder(folder: Path) -> list[Path]:
     """Make the folder and those above it; the ones that were missing, innermost first, for remove_empty."""
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     return missing
 
 
-def remove_empty(folders: Iterable[Path]) -> None:
+def _remove_empty(folders: Iterable[Path]) -> None:
     """Remove those of the folders that hold nothing."""
     for folder in folders:
         with suppress(OSError):
@@ -94,7 +141,22 @@ def remove_empty(folders: Iterable[Path]) -> None:
 
 
 def remove_files(folder: Path, names: Iterable[str]) -> None:
-    """Remove the files of these names in the folder; links themselves and not what they lead to; other files stay."""
+    """Remove the files of these names from a folder. All other files stay.
+
+    A symbolic link is removed itself, and what it leads to stays. Names of files that do not exist are passed over.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+    names
+        The names of the files, without any folder.
+
+    Raises
+    ------
+    InputError
+        On a name that could lead to another folder.
+    """
     for name in names:
         check_name("the file", name)
         with suppress(FileNotFoundError, NotADirectoryError):

@@ -126,15 +126,15 @@ def penalised(problem: InterfaceProblem, stiffness: float = 1e3) -> Program:
     Returns
     -------
     Program
-        Variable r_n (k,). Parameters r_t (k (dim - 1),) and softness = 1 / stiffness. Multipliers "gap", negative
+        Variable r_n (k,). Parameters r_t (k (dim - 1),) and compliance = 1 / stiffness. Multipliers "gap", negative
         where the bodies penetrate, and "approach".
     """
     r, cost, balance, readers, r_t = _normal_parts(problem)
-    softness = cp.Parameter(nonneg=True, value=1 / stiffness)
+    compliance = cp.Parameter(nonneg=True, value=1 / stiffness)
     push = r >= 0
-    readers = {"gap": lambda: _dual(push) - softness.value * r.value} | readers
-    program = cp.Problem(cp.Minimize(cost + softness * cp.sum_squares(r) / 2), [push, *balance])
-    return Program(program, {"r_n": r}, {"r_t": r_t, "softness": softness}, readers)
+    readers = {"gap": lambda: _dual(push) - compliance.value * r.value} | readers
+    program = cp.Problem(cp.Minimize(cost + compliance * cp.sum_squares(r) / 2), [push, *balance])
+    return Program(program, {"r_n": r}, {"r_t": r_t, "compliance": compliance}, readers)
 
 
 def bilateral(problem: InterfaceProblem) -> Program:

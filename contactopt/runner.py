@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from contactopt.analysis.accuracy import Estimate, refine
+from contactopt.analysis.limits import Limits
 from contactopt.analysis.paths import PathResult, solve_states
 from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
-from contactopt.analysis.resultants import tables
+from contactopt.analysis.resolution import remarks
+from contactopt.analysis.resultants import mirrors, tables
 from contactopt.analysis.solve_scene import Options, Solved
 from contactopt.bodies.ranks import Team, spread
 from contactopt.cards import card, count, line
@@ -63,7 +65,8 @@ class Result:
         s = self.summary
         states = "" if self.path is None else count(len(self.path.states), "state")
         contacts = count(s["contact_nodes"], "contact")
-        return line("Result", self.scene.name, s["status"], f"residual {s['residual']:.1e}", contacts, states)
+        aim = "" if self.estimate is None else repr(self.estimate)
+        return line("Result", self.scene.name, s["status"], f"residual {s['residual']:.1e}", contacts, states, aim)
 
     def _repr_html_(self) -> str:
         s, (length, stress) = self.summary, self.scene.units
@@ -77,6 +80,9 @@ class Result:
         for key in ("approach", "contact_half_width", "stick_half_width"):
             if s[key] is not None:
                 rows[key.replace("_", " ")] = f"{s[key]:.6g} {length}"
+        if self.estimate is not None:
+            rows[self.estimate.quantity] = f"{self.estimate.value:.6g}; {self.estimate.message}"
+            rows["meshes"] = "; ".join(f"{level.unknowns}: {level.value:.6g}" for level in self.estimate.levels)
         return card(f"{self.scene.name}, {self.scene.friction}", rows)
 
     def view(self, file: str | Path | None = None, show: bool = True) -> Path:
@@ -105,7 +111,7 @@ class Result:
         if file is None:
             file = Path(tempfile.mkdtemp(prefix="contactopt-")) / PAGE
         with tempfile.TemporaryDirectory() as folder:
-            write(self, Path(folder))
+            write(self, Path(folder), states=True)
             (Path(folder) / "summary.json").write_text(json.dumps(self.summary))
             made = write_page(folder, file)
         if show:
@@ -142,6 +148,10 @@ def run(
     accuracy: float | None = None,
     quantity: str | None = None,
     adaptive: bool = False,
+    simplest: bool = False,
+    max_unknowns: int | None = None,
+    time_limit: float | None = None,
+    max_memory: float | None = None,
     figures: Sequence[str] = ("png",),
     html: bool = False,
     note: Note = lambda text: None,
@@ -163,10 +173,15 @@ def run(
     elements : across the contact half-width
     accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
         sentence in `Result.estimate` says why not; `elements` only scales the first mesh
-    quantity : a name in contactopt.analysis.quantities.QUANTITIES; of one of several pairs of surfaces 'NAME:PAIR'
+    quantity : a name in contactopt.analysis.quantities.QUANTITIES; of one of several pairs of surfaces 'NAME:PAIR'; or one of
+        contactopt.analysis.places, such as 'von_mises:BODY:BOUNDARY' or 'pressure@X,Y'
     adaptive : whether meshes are refined only where the quantity needs it (contactopt.adaptivity), each body by itself, and not
         everywhere; quadrilaterals become triangles. More quantities can be bounded then, see contactopt.derivatives.outputs
+    max_unknowns, time_limit, max_memory : bounds on the search for the accuracy: unknowns of a mesh, seconds and GB of all. No
+        further mesh is begun that would pass one; the result is then the best answer so far, with its estimate
         All arguments from `method` to here may stand in a scene file; those given here win.
+    simplest : whether all that can be left out exactly is left out first: halves across planes of symmetry, the third dimension of
+        plates between rollers and of bodies of revolution (contactopt.simplify). `Result.scene` is what was solved
     figures : the formats in which figures are written, of png, svg and pdf; (): none are drawn, which saves half of the time
         of a small scene
     html : whether to write view.html too, the result as a page to explore (needs `pip install 'contactopt[view]'`)
@@ -192,10 +207,19 @@ def run(
 
     changes |= {} if elements is None else {"elements": elements}
     states = _states(scene, changes) if file is None else _states_of_file(file, changes)
+    states = _simplest(states, note) if simplest else states
     names = {"normal": normal, "tangential": tangential, "preconditioner": preconditioner}
     given = {key: choose(key, name) for key, name in names.items() if choose(key, name) is not None}
     method = choose("method", method) or default_method(given)
-    aim = _aim(choose("accuracy", accuracy), choose("quantity", quantity), choose("adaptive", adaptive or None, False))
+    bounds = {"unknowns": max_unknowns, "seconds": time_limit, "memory": max_memory}
+    keys = dict(zip(bounds, ("max_unknowns", "time_limit", "max_memory")))
+    bounds = {name: choose(keys[name], value) for name, value in bounds.items()}
+    aim = _aim(
+        choose("accuracy", accuracy),
+        choose("quantity", quantity),
+        choose("adaptive", adaptive or None, False),
+        {name: value for name, value in bounds.items() if value is not None},
+    )
     chosen = find_method(method, **given)
     backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
     form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
@@ -252,7 +276,7 @@ def _finish(
             with _clock(seconds, "figures"):
                 draw(made, folder, formats)
         with _clock(seconds, "files"):
-            write(made, folder)
+            write(made, folder, states="html" in files)
         made = replace(made, summary=summary | _seconds(seconds, start))
         (folder / "summary.json").write_text(json.dumps(made.summary, indent=2) + "\n")
         if "html" in files:
@@ -288,6 +312,39 @@ def _states(scene: Any, changes: dict[str, Any]) -> tuple[Scene, ...]:
     return (replace(scene, **changes),)
 
 
+def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:
+    """The scene that a name or a scene file stands for, of a load path its last state.
+
+    Parameters
+    ----------
+    scene, changes : as for run()
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InputError : for an unknown name, a file with a mistake, or changes that do not fit
+    """
+    file = _scene_file(scene)
+    return (_states(scene, changes) if file is None else _states_of_file(file, changes))[-1]
+
+
+def _simplest(states: tuple[Scene, ...], note: Note) -> tuple[Scene, ...]:
+    """The scene after all exact simplifications."""
+    if len(states) > 1:
+        raise InputError(
+            f"scene '{states[0].name}' has a load path, whose states would all have to be symmetric; ask contactopt.simplify "
+            "for each state."
+        )
+    from contactopt.analysis.simplest import simplify
+
+    found = simplify(states[0], solve=False)
+    note(found.needs)
+    return (found.scene,)
+
+
 def _form(Q: str, preconditioner: str | None) -> str:
     if preconditioner is None:
         return Q
@@ -297,21 +354,26 @@ def _form(Q: str, preconditioner: str | None) -> str:
 
 
 class Aim(NamedTuple):
-    """An accuracy to be reached: the bound, what it bounds, and whether meshes are refined only where that needs it."""
+    """An accuracy to be reached: the bound, what it bounds, whether meshes are refined only where that needs it, and limits."""
 
     accuracy: float
     quantity: str
     adaptive: bool
+    limits: Limits
 
 
-def _aim(accuracy: float | None, quantity: str | None, adaptive: bool) -> Aim | None:
+def _aim(accuracy: float | None, quantity: str | None, adaptive: bool, bounds: dict[str, Any]) -> Aim | None:
     if (accuracy is None) != (quantity is None):
         raise InputError("accuracy and quantity belong together: the bound, and the name of what it bounds.")
     if accuracy is None or quantity is None:
         if adaptive:
             raise InputError("adaptive refinement needs an aim: give an accuracy and a quantity.")
+        if bounds:
+            raise InputError(
+                "bounds on unknowns, time and memory end the search for an accuracy: give an accuracy and a quantity."
+            )
         return None
-    return Aim(accuracy, quantity, adaptive)
+    return Aim(accuracy, quantity, adaptive, Limits(**bounds))
 
 
 def _solve(
@@ -322,13 +384,13 @@ def _solve(
         solved = solve_states(states, options=options)
         return solved, solved.path, None
     if not aim.adaptive:
-        mesh, estimate = refine(states, aim.quantity, aim.accuracy, options)
+        mesh, estimate = refine(states, aim.quantity, aim.accuracy, options, aim.limits)
         return mesh.solved, mesh.solved.path, estimate
     if len(states) > 1:
         raise InputError(f"scene '{states[0].name}' has a load path, which adaptive refinement does not follow.")
     from contactopt.adaptivity import refine_locally  # it brings the room of derivatives with it
 
-    solved, adapted = refine_locally(states[0], aim.quantity, aim.accuracy, options)
+    solved, adapted = refine_locally(states[0], aim.quantity, aim.accuracy, options, aim.limits)
     return solved, None, adapted
 
 
@@ -348,6 +410,7 @@ def _summary(
         "scene": reduction.scene.name,
         "kind": reduction.scene.kind,
         "units": list(reduction.scene.units),
+        "mirrors": mirrors(reduction),
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
         "mu": float(problem.mu.max(initial=0.0)),
@@ -366,6 +429,7 @@ def _summary(
         "pressure": peak_pressure(reduction, solution) if single else None,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
+        "remarks": list(remarks(reduction, solution)),
         **found,
     }
     if path is not None:

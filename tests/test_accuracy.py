@@ -9,6 +9,7 @@ from skfem import MeshQuad
 from contactopt import Contact, InputError, Plate, Rigid, cli, run, scenes, solve
 from contactopt.analysis import accuracy
 from contactopt.analysis.accuracy import MOST_UNKNOWNS, refine, remainder
+from contactopt.analysis.limits import Limits
 from contactopt.analysis.quantities import QUANTITIES, at_rim, peak_pressure
 from contactopt.analysis.zone import solve_zone
 from contactopt.bodies.refinement import split
@@ -148,8 +149,7 @@ def test_a_limit_on_memory(monkeypatch):
     """The next mesh is not begun where the meshes so far show that it would take more."""
     taken = iter(np.arange(100) * 1e6)  # each solve takes a megabyte
     monkeypatch.setattr(accuracy, "resident_memory", lambda: next(taken))
-    monkeypatch.setattr(accuracy, "MOST_MEMORY", 5e6)
-    solved, estimate = refine([punch()], "energy", 1e-6)
+    solved, estimate = refine([punch()], "energy", 1e-6, limits=Limits(memory=0.005))
     assert not estimate.reached and "GB of memory, more than 0.005 GB" in estimate.message
     count = len(estimate.levels)
     assert 2 <= count < 5 and solved.solution.solved

@@ -1,5 +1,7 @@
 """What "solved" promises, checked contact by contact, and the problems that fooled certificates."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -156,3 +158,24 @@ def test_rigid_bodies_without_any_compliance(gaps, unit):
     assert np.allclose(problem.V.T @ solution.reactions.ravel(), -problem.s)
     assert np.all(u[:, 0] > -1e-9) and np.all(np.abs(u[solution.reactions[:, 0] > 1e-6, 0]) < 1e-9)
     assert str(solve(rigid_table(unit * np.array(gaps), push=(-100.0, 40.0))).status) == "infeasible"
+
+
+@dataclass(eq=False)
+class _Endless:
+    """A method that works for ever and never comes closer; its clock is that of the test."""
+
+    clock: list[float]
+
+    def iterate(self, problem, start=None):
+        while True:
+            self.clock[0] += 1.0  # second
+            yield np.ones(problem.q.shape) * self.clock[0], np.zeros(len(problem.s))
+
+
+def test_a_proof_that_there_is_no_solution_ends_a_method_that_would_go_on(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("contactopt.solving.driver.time.perf_counter", lambda: clock[0])
+    overlapping = NOT_SOLVABLE["squeezed from both sides"]
+    solution = solve(overlapping, _Endless(clock))
+    assert solution.status is Status.INFEASIBLE and solution.proof is not None
+    assert solution.iterations == 2  # the first whose work took longer than a second

@@ -108,3 +108,12 @@ def test_bash_completes_commands_options_and_scenes():
 def test_other_shells_get_a_script_of_their_own(shell, capsys):
     assert cli.main(["completion", shell]) == 0
     assert "punch-3d" in capsys.readouterr().out
+
+
+def test_a_reader_that_wants_no_more_output_is_no_error():
+    """As in `contactopt list | head -1`."""
+    command = [sys.executable, "-m", "contactopt", "list"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stdout.close()
+        assert "Traceback" not in process.stderr.read()
+    assert process.returncode == 0

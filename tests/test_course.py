@@ -1,5 +1,6 @@
 """The chapters run, their exercises grade themselves, and the solutions pass the grades that wrong answers fail."""
 
+import json
 import re
 import runpy
 from pathlib import Path
@@ -59,6 +60,27 @@ def test_readers_get_questions_without_answers(name, generate):
         assert (cell in asked) == ('tags=["solution"]' not in cell.splitlines()[0])
         assert (cell in solved) == ('tags=["exercise"]' not in cell.splitlines()[0])
     assert asked.count("= ...") + asked.count("= (..., ...)") == len(exercises(text))
+
+
+@pytest.mark.parametrize("name", list(CHAPTERS))
+def test_a_chapter_has_all_its_parts_and_folds_what_only_draws(name, generate):
+    text = CHAPTERS[name].read_text()
+    for part in (
+        "## The mechanical system",
+        "rimal",
+        "ual",
+        "## The optimality conditions",
+        "KKT",
+        "cvxpy",
+        "## What fails",
+    ):
+        assert part in text, part
+    (notebook,) = (page for path, page in generate.notebook("course", name, text) if path.suffix == ".ipynb")
+    folded = [
+        cell for cell in json.loads(notebook)["cells"] if cell["metadata"].get("jupyter", {}).get("source_hidden")
+    ]
+    assert len(folded) == text.count('tags=["hide-input"]') > 0
+    assert all(re.search(r"\b(ax|plt)\.", "".join(cell["source"])) for cell in folded), "only drawings are folded"
 
 
 def test_answers_are_graded(capsys):

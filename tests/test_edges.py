@@ -44,6 +44,18 @@ def test_edges_of_exact_tractions_on_a_surface():
     assert stick_edge(scene, problem, r)[0] == pytest.approx(0.613, rel=1e-9)
 
 
+def test_a_surface_of_which_one_corner_is_open_is_no_disc():
+    grid = np.linspace(-0.5, 0.5, 6)
+    x = np.stack(np.meshgrid(grid, grid)).reshape(2, -1)
+    edge = np.where(np.isin(np.arange(6), (0, 5)), 0.1, 0.2)
+    areas = np.outer(edge, edge).ravel()
+    scene, problem = contact(x, "solid", areas)
+    tilted = np.maximum(0.0, 1.2 + x.sum(axis=0)) * areas  # presses least on the first corner
+    tilted[0] = 0.0
+    r = np.stack([tilted, 0 * tilted, 0 * tilted], axis=1)
+    assert contact_edge(scene, problem, r) == pytest.approx(np.sqrt(areas[1:].sum()) / 2, rel=1e-12)
+
+
 def test_stick_edge_after_a_reversal():
     x = np.linspace(-1.25, 1.25, 201)
     scene, problem = contact(x[None], "plane-strain", np.full(201, 0.0125))

@@ -18,24 +18,32 @@ CASES = {
     "plane strain": (
         lambda: scenes.flat_punch(2, elements=8),
         ("mu", "E:punch", "nu:foundation", "force:punch:y"),
-        ("approach", "energy", "pressure:3", "pressure"),
+        (
+            "approach",
+            "energy",
+            "pressure:3",
+            "pressure",
+            "von_mises:punch@0.1,0.2",
+            "stress_xy:foundation@0.3,-0.4",
+            "pressure@0.3,0",
+        ),
     ),
     "axisymmetric": (
         lambda: scenes.make_scene("sphere", elements=6),
         ("E", "nu", "force:sphere:z"),
-        ("approach", "width"),
+        ("approach", "width", "von_mises:sphere"),
     ),
     "solid": (
         lambda: scenes.flat_punch(3, elements=3),
         ("nu:punch", "mu"),
-        ("approach", "energy"),
+        ("approach", "energy", "von_mises:foundation@0.1,0.2,-0.3", "pressure@0.3,0.1,0"),
     ),
     "half-spaces": (
         lambda: scenes.make_scene("cattaneo-half-space", elements=4),
         ("nu", "mu", "force:sphere:x"),
         ("shift", "energy"),
     ),
-    "several bodies": (lambda: scenes.make_scene("stack"), ("E", "nu"), ("energy",)),
+    "several bodies": (lambda: scenes.make_scene("stack"), ("E", "nu"), ("energy", "pressure:block-2-block-1.top")),
 }
 
 

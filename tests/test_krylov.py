@@ -21,9 +21,11 @@ from contactopt.problem.operators import (
     shifted,
 )
 from contactopt.scenes import make_scene
+from contactopt.solving.constants import PATIENCE
 from contactopt.solving.kernels.alart_curnier import coulomb_equations
 from contactopt.solving.kernels.krylov import krylov_step, model_of
 from contactopt.solving.kernels.subproblems import KrylovSubproblem
+from contactopt.solving.methods.newton import Newton
 
 SMALL = {"punch-2d": 16, "sphere": 12, "punch-3d": 4}
 
@@ -171,6 +173,21 @@ def test_auto_falls_back_on_the_entries_of_Q():
     )
     assert solve(problem).solved
     assert solve(problem, "nsgs", max_iterations=3).iterations == 3  # methods without products get the entries
+
+
+def test_auto_gives_up_a_start_that_leads_nowhere(monkeypatch):
+    problem = reduce(scenes.flat_punch(2, elements=16, mu=0.3), Q="implicit")
+    cold, steps = solve(problem), Newton.steps
+    bad = replace(cold, reactions=np.ones_like(cold.reactions))
+
+    def lost(self, problem, start):
+        if start is None:
+            return steps(self, problem, start)
+        return ((start, 1.0) for _ in range(100))
+
+    monkeypatch.setattr(Newton, "steps", lost)
+    solution = solve(problem, start=bad)
+    assert solution.solved and solution.iterations == cold.iterations + PATIENCE + 1
 
 
 def test_the_form_is_chosen_by_cost():

@@ -22,13 +22,14 @@ def law_violation(W, v, mu, r, bilateral):
     return max(normal, force - bound, opposed)
 
 
-@pytest.mark.parametrize("dim,bilateral", [*product((2, 3), (False, True))])
-def test_local_problems_obey_the_law(dim, bilateral):
+@pytest.mark.parametrize("dim,bilateral,turned", [*product((2, 3), (False, True), (0.0, 0.5))])
+def test_local_problems_obey_the_law(dim, bilateral, turned):
+    """turned  size of the unsymmetric part of W."""
     rng = np.random.default_rng(dim)
     states = set()
     for trial in range(400):
         A = rng.normal(size=(dim, dim))
-        W, v = A @ A.T + 0.05 * np.eye(dim), rng.normal(size=dim)
+        W, v = A @ A.T + 0.05 * np.eye(dim) + turned * (A - A.T), rng.normal(size=dim)
         mu = 0.0 if trial % 10 == 0 else rng.uniform(0.05, 1.5)
         r = Local(W, mu, bilateral).solve(v.tolist())
         assert law_violation(W, v, mu, r, bilateral) < 1e-9 * (1 + np.linalg.norm(r)) ** 2

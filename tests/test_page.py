@@ -12,11 +12,13 @@ from browser import CHROMIUM, Browser
 
 from contactopt import InputError, cli, run, scenes
 from contactopt.figures.page import certificate_words
+from contactopt.interface.recovery import recover
 
 
 def decoded(packed):
-    kind = {"f4": "<f4", "i4": "<i4"}[packed["type"]]
-    return np.frombuffer(base64.b64decode(packed["data"]), kind).reshape(packed["shape"])
+    kind = {"f4": "<f4", "i4": "<i4", "u2": "<u2"}[packed["type"]]
+    values = np.frombuffer(base64.b64decode(packed["data"]), kind).reshape(packed["shape"])
+    return values if kind != "<u2" else packed["low"] + packed["step"] * values
 
 
 def data_of(file):
@@ -32,20 +34,49 @@ def folder(tmp_path_factory):
     return made
 
 
-def test_the_bodies_on_the_page_are_those_of_the_result(folder):
-    result = run(scenes.flat_punch(3, elements=3))
-    data = data_of(folder / "solid" / "view.html")
+def surface_area(points, cells):
+    first, second, third = points[cells].transpose(1, 0, 2)
+    return np.linalg.norm(np.cross(second - first, third - first), axis=1).sum() / 2
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_bodies_on_the_page_are_those_of_the_result(degree, tmp_path):
+    result = run(scenes.flat_punch(3, elements=3 - degree), tmp_path, figures=(), html=True, degree=degree)
+    data = data_of(tmp_path / "view.html")
     for fields in result.fields:
         (body,) = (body for body in data["bodies"] if body["name"] == fields.name)
-        points, cells = decoded(body["points"]), decoded(body["cells"])
-        surface = fields.mesh.p.T[np.unique(fields.mesh.facets[:, fields.mesh.boundary_facets()])]
-        assert np.allclose(np.sort(points, axis=0), np.sort(surface, axis=0), rtol=1e-6)
-        first, second, third = points[cells].transpose(1, 0, 2)
-        area = np.linalg.norm(np.cross(second - first, third - first), axis=1).sum() / 2
+        points = decoded(body["points"])
+        cells = np.concatenate([decoded(body["cells"]), decoded(body["cut_cells"])])
+        assert np.allclose(points, fields.mesh.p.T, rtol=1e-6)  # with those in the middle of edges and those inside
         x, y, z = np.ptp(fields.mesh.p, axis=1)
-        assert area == pytest.approx(2 * (x * y + y * z + z * x), rel=1e-5)  # the whole surface of the block, once
-        assert decoded(body["values"]["von_mises"]).max() <= fields.von_mises.max() * (1 + 1e-6)
-        assert len(decoded(body["values"]["stress_xz"])) == len(points)
+        assert surface_area(points, cells) == pytest.approx(2 * (x * y + y * z + z * x), rel=1e-5)  # of the block, once
+        assert np.allclose(decoded(body["values"]["von_mises"])[0], fields.von_mises, rtol=1e-5)
+        assert np.allclose(decoded(body["move"])[0], fields.displacement.T, rtol=1e-5, atol=1e-9)
+        assert decoded(body["values"]["stress_xz"]).shape == (1, len(points))
+        assert decoded(body["edges"]).max() < len(points) > decoded(body["lines"]).max()
+
+
+def test_the_inside_of_large_bodies_is_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr("contactopt.figures.page.MOST_INSIDE", 10)
+    result = run(scenes.flat_punch(3, elements=2), tmp_path, figures=(), html=True)
+    for body in data_of(tmp_path / "view.html")["bodies"]:
+        (fields,) = (fields for fields in result.fields if fields.name == body["name"])
+        surface = fields.mesh.p.T[np.unique(fields.mesh.facets[:, fields.mesh.boundary_facets()])]
+        points = decoded(body["points"])
+        assert np.allclose(np.sort(points, axis=0), np.sort(surface, axis=0), rtol=1e-6)
+        assert not decoded(body["inside"]).size
+        x, y, z = np.ptp(surface, axis=0)
+        cells = [decoded(body[name]) for name in ("cells", "cut_cells")]  # in the two planes of symmetry the latter
+        assert surface_area(points, cells[0]) == pytest.approx(2 * x * y + y * z + z * x, rel=1e-5)
+        assert surface_area(points, cells[1]) == pytest.approx(y * z + z * x, rel=1e-5)
+
+
+def test_half_models_are_shown_whole(folder):
+    data = data_of(folder / "solid" / "view.html")
+    assert sorted(data["mirrors"]) == [[0, 0.0], [1, 0.0]]  # a quarter of the block
+    low, high = np.array(data["box"])
+    assert np.allclose(low[:2], -high[:2])
+    assert data_of(folder / "flat" / "view.html")["mirrors"] == [[0, 0.0]]
 
 
 def test_every_state_of_a_path_is_on_the_page(folder):
@@ -53,6 +84,7 @@ def test_every_state_of_a_path_is_on_the_page(folder):
     data = data_of(folder / "path" / "view.html")
     (pair,) = data["contacts"]
     assert data["states"] == len(path.states)
+    names = [part.name for part in path.reduction.scene.parts]
     for number, state in enumerate(path.states):
         r, areas = state.solution.reactions, path.reduction.problem.areas
         assert np.allclose(decoded(pair["states"]["pressure"])[number], r[:, 0] / areas, rtol=1e-5, atol=1e-9)
@@ -61,7 +93,30 @@ def test_every_state_of_a_path_is_on_the_page(folder):
         assert (np.sum(status == 1), np.sum(status == 2)) == (stick, slip)
         bound, along = (decoded(pair["states"][name])[number] for name in ("bound", "along"))
         assert np.allclose(bound[status == 2], np.abs(along[status == 2]), rtol=1e-5)
+        gap, slip = (decoded(pair["states"][name])[number] for name in ("gap", "slip"))
+        assert np.allclose(gap, state.displacements[:, 0], atol=1e-9)
+        assert np.allclose(slip, np.abs(state.slip[:, 0]), rtol=1e-4, atol=1e-9)
+        force = np.einsum("kad,ka->kd", path.reduction.frames, r) / areas[:, None]
+        assert np.allclose(decoded(pair["states"]["vector"])[number, :, :2], force, rtol=1e-4, atol=1e-7)
+        for fields, body in zip(path.fields(number), sorted(data["bodies"], key=lambda b: names.index(b["name"]))):
+            assert fields.name == body["name"] and data["moving"]
+            for packed, exact in (
+                (body["move"], fields.displacement.T),
+                (body["values"]["von_mises"], fields.von_mises),
+            ):
+                assert np.abs(decoded(packed)[number] - exact).max() <= packed["step"]
+                assert packed["step"] == pytest.approx(np.ptp(decoded(packed)) / 65535, rel=1e-4)
     assert np.allclose(data["history"]["shear_force"], path.history["shear_force"])
+    assert np.allclose(path.fields(-1)[0].stress, recover(path.reduction, path.solution)[0].stress)
+
+
+def test_bodies_of_long_paths_stay_and_the_page_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr("contactopt.figures.output.MOST_NUMBERS", 1000)
+    run("cattaneo-2d", tmp_path, steps=2, elements=8, figures=(), html=True)
+    text, data = (tmp_path / "view.html").read_text(), data_of(tmp_path / "view.html")
+    assert not data["moving"] and len(decoded(data["bodies"][0]["move"])) == 1
+    assert "The bodies are those of the last state" in text
+    assert not (tmp_path / "states.npz").exists()
 
 
 def test_the_page_stands_alone_and_is_small(folder):
@@ -106,6 +161,16 @@ def test_the_certificate_in_words_tells_a_solution_from_an_iterate():
     assert certificate_words(stopped).startswith("This is not a solution, only the last iterate (it stalled).")
 
 
+def test_an_adaptive_run_shows_its_last_mesh_and_the_sizes_of_all(tmp_path):
+    result = run("sphere", tmp_path, accuracy=0.05, quantity="pressure", adaptive=True, figures=(), html=True)
+    text, data = (tmp_path / "view.html").read_text(), data_of(tmp_path / "view.html")
+    for fields, body in zip(result.fields, sorted(data["bodies"], key=lambda body: body["name"], reverse=True)):
+        assert fields.name == body["name"]
+        assert len(decoded(body["lines"])) == fields.mesh.nfacets  # every side of a triangle once
+    assert ", ".join(str(level.unknowns) for level in result.estimate.levels) in text
+    assert result.estimate.message in text
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 @pytest.mark.parametrize("name,width", [("path", 400)])
 def test_a_browser_shows_the_page_and_the_keyboard_turns_it(folder, name, width):
@@ -125,4 +190,35 @@ def test_a_browser_shows_the_page_and_the_keyboard_turns_it(folder, name, width)
                 "const s = document.getElementById('state'); s.focus(); s.value = 0; s.dispatchEvent(new Event('input'))"
             )
             assert browser.ask(words).startswith("state 1 of ")
+        assert not browser.faults
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+def test_bodies_move_with_the_slider_and_solids_are_cut_and_mirrored(folder):
+    moved = "JSON.stringify([...document.getElementById('view').data[0].y].slice(0, 50))"
+    with Browser(folder / "path" / "view.html", 1000) as browser:
+        browser.wait("document.querySelectorAll('#contact-chart .main-svg').length > 0")
+        last = browser.ask(moved)
+        browser.ask(
+            "(() => { const s = document.getElementById('state'); s.value = 0; s.dispatchEvent(new Event('input')); })()"
+        )
+        assert browser.ask(moved) != last and not browser.faults
+    drawn = "document.getElementById('view').data.filter((trace) => trace.type === 'mesh3d')"
+    reach = f"JSON.stringify({drawn}.slice(0, 2).map((t) => t.x.reduce((a, v) => [Math.min(a[0], v), Math.max(a[1], v)], [9, -9])))"
+    with Browser(folder / "solid" / "view.html", 1000) as browser:
+        browser.wait("document.querySelectorAll('#contact-chart .main-svg').length > 0")
+        (low, high), *_ = json.loads(browser.ask(reach))
+        assert low == pytest.approx(-high)
+        browser.ask("document.getElementById('whole').click()")
+        assert json.loads(browser.ask(reach))[0][0] > -1e-6
+        browser.ask("document.getElementById('whole').click()")
+        low, high = (corner[0] for corner in data_of(folder / "solid" / "view.html")["box"])
+        browser.ask(
+            "(() => { for (const [id, value, event] of [['cut', '0', 'change'], ['cut-place', '0.5', 'input']])"
+            " { const c = document.getElementById(id); c.value = value; c.dispatchEvent(new Event(event)); } })()"
+        )
+        used = f"(() => {{ const t = {drawn}[0]; return Math.min(...[...t.i].map((n) => t.x[n])); }})()"
+        assert browser.ask(used) >= (low + high) / 2 - 1e-3 * (high - low)
+        assert "from x = " in browser.ask("document.getElementById('cut-words').innerText")
         assert not browser.faults

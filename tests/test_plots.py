@@ -1,18 +1,24 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import two_blocks
 
 from contactopt import plots, reduce_bodies, run, scenes, solve
+from contactopt.figures.solids import nearest, picture
 
 
 @pytest.mark.parametrize("name,elements", [("punch-2d", 5), ("punch-3d", 3), ("sphere", 8)])
 def test_every_axis_is_labelled_with_its_unit(name, elements):
     result = run(name, elements=elements)
     figure = plots.contact_figure(result.scene, result.problem, result.solution)
-    axes = [*figure.axes, plots.deformed(result.scene, result.problem, result.fields)]
-    for ax in axes:
-        for label in (ax.get_xlabel(), ax.get_ylabel()):
-            assert "[" in label and "]" in label
+    bodies = plots.deformed(result.scene, result.problem, result.fields)
+    labels = [label for ax in figure.axes for label in (ax.get_xlabel(), ax.get_ylabel())]
+    labels += [bodies.get_xlabel(), bodies.get_ylabel()] if result.scene.dim == 2 else []
+    assert all("[" in label and "]" in label for label in labels)
+    if result.scene.dim == 3:  # the axes of a picture of solids are drawn in it
+        texts = {text.get_text() for text in bodies.texts}
+        assert {"x [mm]", "y [mm]", "z [mm]"} <= texts
 
 
 def test_a_users_scene_is_not_labelled_with_our_units():
@@ -40,8 +46,6 @@ def test_a_rigid_punch_is_drawn_with_its_exact_curve():
 
 
 def test_triangles_and_convergence_are_drawn():
-    from dataclasses import replace
-
     base = two_blocks("plane-strain", mu=0.3)
     up = base.upper.mesh.to_meshtri()
     up = up.with_boundaries({"top": lambda x: x[1] == 1, "bottom": lambda x: x[1] == 0, "side0": lambda x: x[0] == 0})
@@ -50,3 +54,45 @@ def test_triangles_and_convergence_are_drawn():
     assert plots.deformed(scene, result.problem, result.fields).collections
     ax = plots.convergence({"one": result.solution, "two": solve(reduce_bodies(scene).problem, tol=1e-4)})
     assert len(ax.lines) == 2 and ax.get_yscale() == "log"
+
+
+def test_nearer_bodies_hide_those_behind_them_in_every_pixel():
+    """Two triangles that pierce each other, and a small one before a large one whose middle is nearer to the eye."""
+    big = np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [0.0, 40.0, 0.0]])
+    tilted = big + np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])  # nearer beyond half of its width
+    owner = nearest(np.stack([big, tilted]), (40, 40))
+    y, x = np.nonzero(owner >= 0)
+    assert abs(len(x) - 800) <= 40 and np.all(x + y + 1 <= 40)
+    assert np.array_equal(owner[y, x] == 1, x + 0.5 > 20)
+    slope = np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [0.0, 40.0, 30.0]])
+    small = np.array(
+        [[2.0, 2.0, 5.0], [8.0, 2.0, 5.0], [2.0, 8.0, 5.0]]
+    )  # behind the middle of the slope, before its foot
+    owner = nearest(np.stack([slope, small]), (40, 40))
+    assert owner[3, 3] == 1 and owner[7, 2] == 0 and owner[30, 2] == 0
+
+
+def test_the_picture_of_a_solid_has_its_colours_and_its_outline():
+    """A square seen from above, whose values grow along x."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    cells = np.array([[0, 1, 2], [0, 2, 3]])
+    lined = np.array([[True, False, True], [True, True, False]])  # its sides, not its diagonal
+    image, (left, right, bottom, top) = picture(
+        corners[cells], corners[cells][..., 0], lined, lambda v: np.stack([v, v, v, np.ones_like(v)], axis=1), 102
+    )
+    assert image.shape[:2] == (102, 102) and np.all(image[[0, -1]] == 0)
+    inner = image[3:-3, 3:-3, 0]
+    middles = left + (np.arange(3, 99) + 0.5) * (right - left) / 102
+    assert np.allclose(inner, middles) and np.allclose(image[1, 3:-3, 0], middles * 0.65)
+    assert bottom == pytest.approx(-0.01) and top == pytest.approx(1.01)
+
+
+def test_a_solid_whose_displacements_are_no_numbers_is_drawn_at_rest():
+    result = run("punch-3d", elements=2)
+    far = [
+        replace(f, displacement=np.full_like(f.displacement, value))
+        for f, value in zip(result.fields, (np.nan, np.inf))
+    ]
+    ax = plots.deformed(result.scene, result.problem, far)
+    left, right, bottom, top = ax.images[0].get_extent()
+    assert np.all(np.isfinite([left, right, bottom, top])) and right - left < 300

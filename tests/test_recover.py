@@ -1,9 +1,14 @@
+from dataclasses import replace
+
 import meshio
 import numpy as np
 import pytest
 from conftest import two_blocks
 
-from contactopt import reduce_bodies, scenes, solve
+from contactopt import reduce_bodies, run, scenes, solve
+from contactopt.bodies.elements import elements_of
+from contactopt.bodies.local_refinement import simplices
+from contactopt.figures.pieces import outline
 from contactopt.interface.recovery import recover
 
 
@@ -58,3 +63,67 @@ def test_plane_strain_out_of_plane_stress():
     for field in solved(scenes.flat_punch(2, elements=6)):
         s = dict(zip(field.names, field.stress.T))
         assert np.allclose(s["zz"], 0.3 * (s["xx"] + s["yy"]), atol=1e-12)
+
+
+# corners whose middle each node of a cell of second order is, as in the documentation of VTK's file formats
+EDGES = {
+    "triangle6": (3, [(0, 1), (1, 2), (2, 0)]),
+    "quad9": (4, [(0, 1), (1, 2), (2, 3), (3, 0), (0, 1, 2, 3)]),
+    "tetra10": (4, [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]),
+    "hexahedron27": (
+        8,
+        [
+            *[(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)],
+            *[(0, 3, 4, 7), (1, 2, 5, 6), (0, 1, 4, 5), (2, 3, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7), tuple(range(8))],
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("kind,cut,name", [
+    ("plane-strain", True, "triangle6"), ("plane-strain", False, "quad9"),
+    ("solid", True, "tetra10"), ("solid", False, "hexahedron27"),
+])  # fmt: skip
+def test_a_quadratic_displacement_is_kept_at_every_node(kind, cut, name, tmp_path):
+    """u_i = x_i^2 (i + 1) + x_0 x_1: its strain is linear, so that stresses are exact at all nodes."""
+    scene = two_blocks(kind)
+    mesh = simplices(scene.upper.mesh) if cut else scene.upper.mesh
+    scene = replace(scene, degree=2, upper=replace(scene.upper, mesh=mesh))
+    body = reduce_bodies(scene).bodies[0]
+    x, dim = body.body.locations, len(scene.components)
+    moved = np.array([(i + 1) * x[i] ** 2 + x[0] * x[1] for i in range(dim)])
+    U = np.zeros(moved.size)
+    U[body.body.unknowns] = moved
+    field = body.fields(U)
+    assert field.displacement.shape == field.mesh.p.shape == x.shape
+    assert np.allclose(field.mesh.p, x) and np.allclose(field.displacement, moved)
+    gradient = np.zeros((3, 3, x.shape[1]))
+    for i in range(dim):
+        gradient[i, 0], gradient[i, 1] = x[1], x[0]
+        gradient[i, i] += 2 * (i + 1) * x[i]
+    strain = (gradient + gradient.swapaxes(0, 1)) / 2
+    E, nu = body.body.material.E, body.body.material.nu
+    stress = E / (1 + nu) * (strain + nu / (1 - 2 * nu) * np.trace(strain) * np.eye(3)[:, :, None])
+    for part, values in zip(field.names, field.stress.T):
+        assert np.allclose(values, stress["xyz".index(part[0]), "xyz".index(part[1])], atol=1e-9)
+    field.write_vtu(tmp_path / "body.vtu")
+    back = meshio.read(tmp_path / "body.vtu")
+    (block,) = back.cells
+    assert block.type == name
+    corners, middles = EDGES[name]
+    for number, among in enumerate(middles):
+        places = back.points[block.data[:, list(among)]].mean(axis=1)
+        assert np.allclose(back.points[block.data[:, corners + number]], places)
+    assert np.allclose(back.point_data["displacement"][:, :dim].T, moved)
+    if cut:
+        sides = back.points[block.data[:, 1 : dim + 1], :dim] - back.points[block.data[:, :1], :dim]
+        assert np.linalg.det(sides).min() > 0
+
+
+def test_nodes_in_the_middle_of_curved_edges_lie_on_the_circle():
+    result = run("press-fit", elements=4, degree=2)
+    for field in result.fields:
+        rim = outline(*elements_of(field.mesh))
+        radius = np.hypot(*field.mesh.p)[rim]
+        arcs = radius[np.isclose(radius[:, 0], radius[:, 2])]
+        assert len(arcs) == 8 and np.allclose(arcs[:, 1], arcs[:, 0])

@@ -4,15 +4,17 @@ import os
 import numpy as np
 import pytest
 from conftest import two_blocks
+from skfem import MeshTri
 
 import contactopt
-from contactopt import InputError, cli, run
+from contactopt import InputError, Material, Part, Plate, Rigid, Scene, cli, run
 from contactopt.analysis.quantities import QUANTITIES
 
 KEYS = [
     "scene",
     "kind",
     "units",
+    "mirrors",
     "dofs",
     "contact_nodes",
     "mu",
@@ -31,6 +33,7 @@ KEYS = [
     "pressure",
     "q",
     "products",
+    "remarks",
     "pairs",
     "holders",
     "seconds",
@@ -196,3 +199,12 @@ def test_the_summary_on_disk_is_that_of_the_result(tmp_path):
     result = run("punch-2d", tmp_path, elements=4)
     assert json.loads((tmp_path / "summary.json").read_text()) == result.summary
     assert {"solve", "recover", "figures", "files", "total"} <= set(result.summary["seconds"])
+
+
+def test_a_contact_that_the_mesh_cannot_show_is_remarked_on():
+    assert run("cylinder-2d", elements=8).summary["remarks"] == []
+    mesh = MeshTri().refined(3).with_boundaries({"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 1})
+    block = Part("block", mesh, Material(E=5.0, nu=0.3), loads=(Plate("top", {"y": -0.1}),), contact="bottom")
+    floor = Rigid("floor", normal=(0.0, 1.0), gap=lambda x: 40.0 * (x[0] - 0.5) ** 2)
+    told = run(Scene("block on a ridge", block, floor, mu=0.4)).summary["remarks"]
+    assert len(told) == 1 and "1 of 9" in told[0] and "block-floor" in told[0]

@@ -182,7 +182,8 @@ def test_bad_scene_fields(change, message):
     [
         (dict(supports=(Support("top", {"z": 0.0}),)), "no component 'z'; use x, y"),
         (dict(supports=(Support("top", {"y": np.nan}),)), "y value"),
-        (dict(loads=(Traction("top", (1.0,)),)), "Traction needs 2 values"),
+        (dict(supports=(Support("top", ("x", "y")),)), "by its name, as in {'y': 0.0}"),
+        (dict(loads=(Traction("top", (1.0,)),)), "Traction needs a tuple of 2 values"),
         (dict(loads=(Traction("top", (1.0, np.inf)),)), "Traction value"),
         (dict(loads=(Plate("top", {"q": 1.0}),)), "no component 'q'"),
     ],

@@ -12,7 +12,7 @@ from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Supp
 from contactopt.problem.chart import Chart
 from contactopt.scenes.meshes import graded
 from contactopt.solving.preconditioners import deflated, preconditioner, smooth_motions
-from contactopt.solving.preconditioners.surface import divergences, inverse_root, surface_matrices
+from contactopt.solving.preconditioners.surface import divergences, inverse_root, laplacian, surface_matrices
 
 POISSON = 0.3
 
@@ -241,3 +241,16 @@ def test_tangential_waves_along_their_direction_meet_more_resistance():
 def test_a_surface_without_cells_is_refused():
     with pytest.raises(InputError, match="needs the cells of the contact surface"):
         preconditioner(InterfaceProblem(np.eye(9), np.zeros((3, 3)), 0.1), "laplacian")
+
+
+def test_eigenvectors_and_poles_are_the_same_root(monkeypatch):
+    points, cells = disc(2)
+    k = points.shape[1]
+    problem = InterfaceProblem(np.eye(3 * k), np.zeros((k, 3)), 0.3, coordinates=points)
+    problem = replace(problem, chart=replace(problem.chart, cells=cells))
+    held = np.zeros((k, 3), dtype=bool)
+    X = np.random.default_rng(0).normal(size=(k, 3))
+    dense = [act(X) for act in laplacian(problem, held)]
+    monkeypatch.setattr("contactopt.solving.preconditioners.surface.EIGENVECTORS", 0)
+    for act, product in zip(laplacian(problem, held), dense):
+        assert np.abs(act(X) - product).max() <= 1e-3 * np.abs(product).max()

@@ -1,5 +1,6 @@
 """Every tutorial runs as a script, its assertions hold, its exercises have solutions that run, its figures labels."""
 
+import ast
 import re
 import runpy
 from pathlib import Path
@@ -70,3 +71,15 @@ def test_claims_are_asserted_and_figures_are_shown_at_the_end(source):
 def test_links_between_tutorials_exist(source):
     for target in re.findall(r"\]\(([\w/.]+\.py)\)", source):
         assert (FOLDER / target).exists(), target
+
+
+@pytest.mark.parametrize(
+    "path", [*TUTORIALS.values(), *sorted((FOLDER.parent / "course").glob("*.py"))], ids=lambda p: p.stem
+)
+def test_no_cell_shows_what_matplotlib_returns(path):
+    """The last expression of a cell is shown below it: a figure is, the legend object of matplotlib is no figure."""
+    for cell in re.split(r"^# %%", path.read_text(), flags=re.M)[1:]:
+        head, _, code = cell.partition("\n")
+        last = ast.parse("" if "[markdown]" in head else code).body[-1:]
+        shown = ast.unparse(last[0]) if last and isinstance(last[0], ast.Expr) else ""
+        assert not re.match(r"(ax|left|right|axes\[\d\])\.(axis|set|legend|plot|text)\b", shown), shown

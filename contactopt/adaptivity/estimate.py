@@ -7,9 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from contactopt.analysis.places import StressReading
 from contactopt.analysis.solve_scene import Solved
 from contactopt.derivatives.outputs import seeds_of
 from contactopt.derivatives.states import Duals, Step
+from contactopt.interface.reduction import Reduction
 
 ENERGY = "energy"
 
@@ -20,15 +22,26 @@ class ElementErrors:
 
     value      of the quantity [its unit]
     bodies     for each body what its elements add (elements,), signed [unit of the quantity]; (0,) for a body without a mesh
+    between    what of it comes from the pressure between contacts [unit of the quantity]
+    energy     estimated error of the displacement in the energy norm, over the norm of the displacement [-]
+    stress     where the quantity is a stress: the reading of it
     """
 
     value: float
     bodies: tuple[np.ndarray, ...]
+    energy: float
+    between: float = 0.0
+    stress: StressReading | None = None
 
     @property
     def total(self) -> float:
         """The estimated error J - J_h [unit of the quantity]."""
         return float(sum(part.sum() for part in self.bodies))
+
+    @property
+    def size(self) -> float:
+        """The estimated size of the error: of the stress in the elements and of the pressure between contacts together."""
+        return abs(self.total - self.between) + abs(self.between)
 
     def marked(self, share: float) -> tuple[np.ndarray, ...]:
         """For each body the fewest elements that together make this share of the sum of absolute errors (Doerfler)."""
@@ -38,6 +51,8 @@ class ElementErrors:
         chosen = np.zeros(len(sizes), dtype=bool)
         chosen[order[:count]] = True
         first = np.cumsum([0, *(len(part) for part in self.bodies)])
+        if self.stress is not None and self.stress.uncertainty > abs(self.total):
+            chosen[first[self.stress.body] + self.stress.doubtful] = True
         return tuple(np.flatnonzero(chosen[a:b]) for a, b in pairwise(first))
 
 
@@ -60,12 +75,70 @@ def element_errors(solved: Solved, quantity: str) -> ElementErrors:
     """
     step = Step(solved.reduction, solved.reduction.problem, solved.solution)
     seeds = seeds_of(quantity, step)
-    if quantity == ENERGY:
-        fields, factor = step.displaced, 0.5
-    else:
+    bodies, displaced = solved.reduction.bodies, step.displaced
+    fields = displaced
+    if quantity != ENERGY:
         dual = step.sensitivity.adjoint(
             reactions=seeds.reactions, multipliers=seeds.multipliers, displacements=seeds.displacements
         )
-        fields, factor = Duals(step, dual, seeds.bodies).fields, 1.0
-    bodies = zip(solved.reduction.bodies, step.displaced, fields)
-    return ElementErrors(seeds.value, tuple(factor * body.recovery_error(U, W) for body, U, W in bodies))
+        fields = Duals(step, dual, seeds.bodies).fields
+    found = [body.recovery_errors(U, U, W) for body, U, W in zip(bodies, displaced, fields)]
+    energy = sum(body.energy(U) for body, U in zip(bodies, displaced))
+    missing = sum(own.sum() for own, _ in found) / 2
+    norm = float(np.sqrt(missing / energy)) if energy > 0 else 0.0
+    if quantity == ENERGY:
+        return ElementErrors(seeds.value, tuple(own / 2 for own, _ in found), norm)
+    errors, between = tuple(product for _, product in found), 0.0
+    if seeds.reactions is not None and not seeds.bodies:
+        shares = between_contacts(solved, seeds.reactions[:, 0])
+        errors = tuple(inside + share for inside, share in zip(errors, shares))
+        between = float(sum(share.sum() for share in shares))
+    return ElementErrors(seeds.value, errors, norm, between, seeds.stress)
+
+
+def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:
+    """What elements at the contact add to the error of a function of the forces, because the pressure varies between contacts.
+
+    Parameters
+    ----------
+    weights : (k,) derivatives of the quantity by the normal forces
+
+    Returns
+    -------
+    For each body (elements,), signed; elements that hold the nodes of a contact share what it adds
+    """
+    reduction, problem = solved.reduction, solved.reduction.problem
+    added = weights * problem.areas * pressure_errors(reduction, solved.solution.reactions[:, 0])
+    F = [np.asarray(abs(B).T @ np.pad(added[:, None], ((0, 0), (0, problem.dim - 1))).ravel()) for B in reduction.maps]
+    shares = [body.on_elements(force) for body, force in zip(reduction.bodies, F)]
+    total = sum(share.sum() for share in shares)
+    factor = added.sum() / total if total != 0 else 0.0
+    return tuple(factor * share for share in shares)
+
+
+def pressure_errors(reduction: Reduction, forces: np.ndarray) -> np.ndarray:
+    """By how much the pressure at each contact exceeds the force over the area there, (k,) [stress].
+
+    The force at a contact is the integral of the pressure with a hat function: over the area of the hat it is a mean of the
+    pressure nearby. On a line with contacts at distance h that mean is p + h^2 p'' / 12. The mean of the piecewise linear
+    function through the contacts is p + h^2 p'' / 6 as its second differences are h^2 p''. Half of what it differs from the
+    value is the error, and this half is taken on surfaces and where distances vary as well.
+    """
+    problem = reduction.problem
+    pressure = np.divide(forces, problem.areas, out=np.zeros(len(forces)), where=problem.areas > 0)
+    errors = np.zeros(len(forces))
+    for pair, coupling in zip(problem.pairs, reduction.couplings):
+        cells = coupling.cells.T
+        if cells.shape[1] != problem.dim:
+            continue
+        own, points = pressure[pair.contacts], problem.coordinates[:, pair.contacts]
+        edges = points[:, cells[:, 1:]] - points[:, cells[:, :1]]
+        size = np.sqrt(np.linalg.det(np.einsum("dfa,dfb->fab", edges, edges)))[:, None]
+        p, r = own[cells], points[0][cells] if reduction.scene.kind == "axisymmetric" else np.ones(cells.shape)
+        (sum_p, sum_r), corner = (x.sum(axis=1, keepdims=True) for x in (p, r)), cells.ravel()
+        # integrals of phi_a phi_b phi_c r_c p_b over a simplex, in units of its smallest one
+        mean = sum_p * sum_r + p * sum_r + r * sum_p + np.sum(p * r, axis=1, keepdims=True) + 2 * p * r
+        smooth = np.bincount(corner, (size * mean).ravel(), len(own))
+        whole = (problem.dim + 2) * np.bincount(corner, (size * (sum_r + r)).ravel(), len(own))
+        errors[pair.contacts] = (own - np.divide(smooth, whole, out=own.copy(), where=whole > 0)) / 2
+    return errors

@@ -28,13 +28,16 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.constants import BELOW, FIRST, MOST_MEMORY, MOST_UNKNOWNS, SLOWEST, STUCK
+from contactopt.analysis.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
+from contactopt.analysis.limits import Limits
 from contactopt.analysis.paths import solve_states
+from contactopt.analysis.places import PLACED, place_of, read_place
 from contactopt.analysis.progress import resident_memory
 from contactopt.analysis.quantities import OF_ONE_PAIR, QUANTITIES, at_rim, uncertainty
 from contactopt.analysis.resultants import views
 from contactopt.analysis.solve_scene import Options, Solved
 from contactopt.bodies.refinement import split_scene
+from contactopt.cards import count, line
 from contactopt.checks import check_number
 from contactopt.errors import InputError
 from contactopt.interface.reduction import Reduction
@@ -72,7 +75,7 @@ class Level:
         return f"{self.elements} elements, {self.splits} splits"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Estimate:
     """What is known of a quantity after the last solve.
 
@@ -99,6 +102,11 @@ class Estimate:
     message: str
     levels: tuple[Level, ...]
 
+    def __repr__(self) -> str:
+        error = "unknown" if self.error is None else f"{self.error:.1e}"
+        meshes = f"{self.levels[-1].unknowns} unknowns, {count(len(self.levels), 'mesh', 'meshes')}"
+        return line("Estimate", f"{self.quantity} {self.value:.6g}", f"error {error} of {self.target:g}", meshes)
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
@@ -124,28 +132,49 @@ class Mesh:
 
 
 def refine(
-    states: Sequence[Scene], quantity: str, accuracy: float, options: Options | None = None
+    states: Sequence[Scene],
+    quantity: str,
+    accuracy: float,
+    options: Options | None = None,
+    limits: Limits | None = None,
 ) -> tuple[Mesh, Estimate]:
     """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
 
     It ends short of the target, with a sentence in the estimate, where the quantity does not converge, where the next mesh
-    would have more than MOST_UNKNOWNS unknowns or take more than MOST_MEMORY bytes, or where a solve fails.
+    would pass a limit, or where a solve fails.
 
     Parameters
     ----------
-    states : the scene, or the states of its load path
-    quantity : a name in QUANTITIES; of one of several pairs of surfaces 'NAME:PAIR', such as 'pressure:block-floor'
-    accuracy : bound on the estimated relative error of the quantity, between 0 and 1
-    options : how each mesh is solved
+    states
+        The scene, or the states of its load path.
+    quantity
+        A name in QUANTITIES; of one of several pairs of surfaces 'NAME:PAIR', such as 'pressure:block-floor'; or one
+        of contactopt.analysis.places, such as 'von_mises:block:fillet'.
+    accuracy
+        Bound on the estimated relative error of the quantity, between 0 and 1.
+    options
+        How each mesh is solved.
+    limits
+        On unknowns, by default MOST_UNKNOWNS, on time and on memory.
+
+    Returns
+    -------
+    tuple
+        The finest Mesh with its solution, and the Estimate with the history of the search.
+
 
     Raises
     ------
-    InputError : for an unknown quantity or an accuracy out of range
+    InputError
+        For an unknown quantity or pair of surfaces, or an accuracy out of range.
     """
-    options = options or Options()
+    options, limits = options or Options(), limits or Limits()
     name, _, pair = quantity.partition(":") if isinstance(quantity, str) else (quantity, "", "")
-    if name not in QUANTITIES:
-        raise InputError(f"unknown quantity {quantity!r}; choose from {', '.join(QUANTITIES)}.")
+    placed = place_of(quantity, states[0]) is not None
+    if name not in QUANTITIES and not placed:
+        raise InputError(f"unknown quantity {quantity!r}; choose from {', '.join((*QUANTITIES, *PLACED))}.")
+    if placed:
+        name, pair = "", ""
     if pair and pair not in (known := [made.name for made in states[0].pairs]):
         raise InputError(
             f"quantity {quantity!r}: there is no pair of surfaces {pair!r}; the pairs are {', '.join(known)}."
@@ -153,7 +182,7 @@ def refine(
     if pair and name not in OF_ONE_PAIR:
         raise InputError(f"the {name} belongs to the whole scene; of one pair ask for {', '.join(OF_ONE_PAIR)}.")
     check_number("the accuracy", accuracy, low=0.0, high=1.0)
-    search = _Search(tuple(states), quantity, options)
+    search = _Search(tuple(states), quantity, options, limits)
     while True:
         mesh, order, grading = *search.mesh_error(), search.grading_error()
         read, scale = search.meshes[-1].uncertainty, abs(search.meshes[-1].value) or 1.0
@@ -215,12 +244,14 @@ class _Search:
     before   memory of the process before the search [bytes];   each  that its meshes take for each unknown [bytes]
     """
 
-    def __init__(self, states: tuple[Scene, ...], quantity: str, options: Options):
-        self.states, self.quantity, self.options = states, quantity, options
+    def __init__(self, states: tuple[Scene, ...], quantity: str, options: Options, limits: Limits):
+        self.states, self.quantity, self.options, self.limits = states, quantity, options, limits
+        self.began = time.perf_counter()
         scene = states[-1]
         self.given = scene.given
         self.first = scene.elements if self.given else max(FIRST[scene.dim], scene.elements // BELOW)
-        self.name, _, self.pair = quantity.partition(":")
+        self.place = place_of(quantity, scene)
+        self.name, _, self.pair = ("", "", "") if self.place else quantity.partition(":")
         self.best = 2 if self.name in EDGES else 2 * scene.degree
         self.levels: list[Level] = []
         self.meshes: list[Level] = []
@@ -296,12 +327,8 @@ class _Search:
         """A sentence if the next mesh passes the limit."""
         dim = self.states[-1].dim
         unknowns = growth * self.meshes[-1].unknowns * self.share**splits
-        if unknowns > MOST_UNKNOWNS[dim]:
-            return f"to go on would take up to {unknowns:.2g} unknowns, more than {MOST_UNKNOWNS[dim]:,}"
-        memory = self.each * (unknowns + self._held())
-        if memory > MOST_MEMORY:
-            return f"to go on would take about {memory / 1e9:.2g} GB of memory, more than {MOST_MEMORY / 1e9:.2g} GB"
-        return ""
+        spent, last = time.perf_counter() - self.began, self.levels[-1].seconds
+        return self.limits.refusal(unknowns, MOST_UNKNOWNS[dim], spent + last, self.each * (unknowns + self._held()))
 
     def _held(self) -> int:
         """Unknowns of the meshes that are kept while the next one is solved."""
@@ -338,7 +365,10 @@ class _Search:
         solved = solve_states(states, elements, self.options, None if self.last is None else self.last.solved)
         reduction, solution, zones = solved.reduction, solved.solution, solved.zones
         seen = self._seen(reduction, solution)
-        value = QUANTITIES[self.name](*seen), uncertainty(self.name, *seen)
+        if self.place is not None:
+            value = read_place(self.place, reduction, solution)
+        else:
+            value = QUANTITIES[self.name](*seen), uncertainty(self.name, *seen)
         size = reduction.dofs, reduction.problem.contacts, max(1, len(zones) - 1), zones[-2] if zones else None
         self.levels.append(Level(elements, splits, *size, *value, time.perf_counter() - begin))
         self.each = (resident_memory() - self.before) / (self._held() + reduction.dofs)

@@ -27,3 +27,7 @@ MOST_UNKNOWNS = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension:
 MOST_MEMORY = 2e9  # bytes that the search may take, by those that its meshes have taken for each unknown so far
 SLOWEST = 0.75  # least order that is believed: slower ones were noise wherever the exact value was known
 STUCK = 0.1  # order below which a sequence does not converge
+
+# Patches of a zone (contactopt.analysis.patches).
+RING = 0.75  # share of an element by which the next ring of nodes is further away at least
+ROUNDNESS = 1.5  # elements by which the edge of a disc may vary around it

@@ -29,30 +29,69 @@ Reader = Callable[[End], list[float]]
 
 
 def equivalent_half_width(scene: Scene, area: float) -> float:
-    """Half-width of the strip, radius of the disc or half side of the square of that area [length]."""
+    """Compute the half-width of a contact zone from its area, as if the zone were a strip, a disc or a square.
+
+    Parameters
+    ----------
+    scene
+        Its kind says which: a strip of the scene's thickness in plane strain, a disc in an axisymmetric scene, and a
+        square in space.
+    area
+        The contact area [length^2].
+
+    Returns
+    -------
+    float
+        Half the width of the strip or of the square, or the radius of the disc [length].
+    """
     if scene.kind == "plane-strain":
         return area / (2 * scene.thickness)
     return float(np.sqrt(area / np.pi) if scene.kind == "axisymmetric" else np.sqrt(area) / 2)
 
 
 def contact_area(scene: Scene, half_width: float) -> float:
-    """The inverse of equivalent_half_width."""
+    """Compute the contact area of a given half-width, the inverse of `equivalent_half_width`.
+
+    Parameters
+    ----------
+    scene
+        Its kind says which: a strip of the scene's thickness in plane strain, a disc in an axisymmetric scene, and a
+        square in space.
+    half_width
+        Half the width of the strip or of the square, or the radius of the disc [length].
+
+    Returns
+    -------
+    float
+        The area [length^2].
+    """
     if scene.kind == "plane-strain":
         return 2 * half_width * scene.thickness
     return float(np.pi * half_width**2 if scene.kind == "axisymmetric" else 4 * half_width**2)
 
 
 def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
-    """Half-width of the contact zone [length].
+    """Read the half-width of the contact zone.
 
     Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against x^2 over the outer
-    part of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than three nodes are left, and where the other end
-    is a corner, a straight line goes through the rings of nodes next to the edge. Where every node touches, or where
-    contact ends at a corner, the edge is that of the contact surface.
+    part of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than three
+    nodes are left, and where the other end is a corner, a straight line goes through the rings of nodes next to the edge.
+    Where every node touches, or where contact ends at a corner, the edge is that of the contact surface. A reading on a
+    surface counts only where the disc of that radius has the area of the zone to within an element.
 
     Parameters
     ----------
-    reactions : (k, dim) nodal forces, normal first [force]
+    scene
+        The scene, which says what symmetry left out.
+    problem
+        Its interface problem, or that of one pair of surfaces.
+    reactions
+        (k, dim) contact forces, normal first [force].
+
+    Returns
+    -------
+    float
+        The half-width [length]; 0 without contact.
     """
     touching = contact_status(problem, reactions).touching
     pressure = reactions[:, 0] / problem.areas
@@ -69,18 +108,29 @@ def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
 def stick_edge(
     scene: Scene, problem: InterfaceProblem, reactions: np.ndarray, slip: np.ndarray | None = None
 ) -> tuple[float, float]:
-    """Half-width of the stick zone and its uncertainty [length].
+    """Read the half-width of the stick zone, with its uncertainty.
 
-    The slack of the friction bound counts towards the direction in which the nearest slipping node slips. Where contact ends
-    at a corner, the pressure is singular: the slack relative to its bound stays smooth but not straight. The values nearest
-    to the edge then serve best, and the edge is the mean of what the slack inside and the slip outside read; it is as
-    uncertain as they differ. A reading that is off by more than an element is left out, which happens to the slip of small
-    steps of a load path.
+    The slack of the friction bound counts towards the direction in which the nearest slipping node slips. Where contact
+    ends at a corner, the pressure is singular: the slack relative to its bound stays smooth but not straight. The
+    values nearest to the edge then serve best, and the edge is the mean of what the slack inside and the slip outside
+    read; it is as uncertain as they differ. A reading that is off by more than an element is left out, which happens to
+    the slip of small steps of a load path.
 
     Parameters
     ----------
-    reactions : (k, dim) nodal forces, normal first [force]
-    slip : (k, dim - 1) tangential motion of the step that led to the reactions [length], if known
+    scene
+        The scene, which says what symmetry left out.
+    problem
+        Its interface problem, or that of one pair of surfaces.
+    reactions
+        (k, dim) contact forces, normal first [force].
+    slip
+        (k, dim - 1) tangential motion of the step that led to the reactions [length], if known.
+
+    Returns
+    -------
+    tuple
+        The half-width and its uncertainty [length]; both are 0 without stick.
     """
     status = contact_status(problem, reactions)
     contact = contact_edge(scene, problem, reactions)
@@ -122,6 +172,8 @@ def _half_width(
     if not found or any(patch is None for patch in found):
         return counted, 0.0
     ends = [patch for patch in found if patch is not None]
+    if problem.dim == 3 and abs(ends[0].last - np.sqrt(problem.areas[inside].sum() / np.pi)) > ends[0].step:
+        return counted, 0.0  # no disc: the zone reaches the rim of the surface on some sides, or is long
     uncertainty = sum(patch.copies * patch.uncertainty for patch in ends)
     if scene.kind == "axisymmetric":  # a ring between two distances from the axis, or a disc
         squares = (abs(patch.last**2 - (patch.first**2 if patch.first > 0 or patch.last < 0 else 0)) for patch in ends)

@@ -44,7 +44,20 @@ class SurfaceContact:
 
 
 def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceContact:
-    """The numbers of a solved state."""
+    """Compute the numbers that describe one solved state.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of the state.
+    solution
+        Its solution.
+
+    Returns
+    -------
+    SurfaceContact
+        Areas, pressures, the mean gap and the work of friction.
+    """
     r, areas = solution.reactions, problem.areas
     status, u = contact_status(problem, r), problem.displacements(r, solution.multipliers)
     area, whole, force = float(areas[status.touching].sum()), float(areas.sum()), float(r[:, 0].sum())
@@ -64,7 +77,22 @@ def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceCon
 def pressure_distribution(
     problem: InterfaceProblem, solution: Solution, bins: int = 50
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Edges (bins + 1,) [stress] and densities (bins,) [1 / stress] of the pressure in contact: shares of the real contact area."""
+    """Compute the distribution of the pressure over the real contact area.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of the state.
+    solution
+        Its solution.
+    bins
+        Number of intervals of pressure.
+
+    Returns
+    -------
+    tuple
+        The edges (bins + 1,) of the intervals [stress], and the density (bins,) [1 / stress], whose integral is one.
+    """
     touching = contact_status(problem, solution.reactions).touching
     pressure = solution.reactions[touching, 0] / problem.areas[touching]
     density, edges = np.histogram(pressure, bins, weights=problem.areas[touching], density=True)
@@ -72,10 +100,22 @@ def pressure_distribution(
 
 
 def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
-    """Stiffness (dim, dim) of the present contacts against relative motions of the bodies along n, t1[, t2] [force / length].
+    """Compute the stiffness of the present contacts against relative motions of the bodies.
 
-    The forces that a small motion adds if no contact opens, closes or changes between stick and slip; those that slip take part
-    with their normal components.
+    It is made of the forces that a small motion adds if no contact opens, closes or changes between stick and slip.
+    Contacts that slip take part with their normal components.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of the state.
+    solution
+        Its solution.
+
+    Returns
+    -------
+    ndarray
+        (dim, dim), along n, t1[, t2] [force / length]; zeros without contact.
     """
     status = contact_status(problem, solution.reactions)
     takes_part = np.repeat(status.stick[:, None], problem.dim, axis=1)
@@ -93,8 +133,27 @@ def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarr
 
 
 def surface_maps(reduction: Reduction, solution: Solution) -> dict[str, np.ndarray]:
-    """Maps on the grid of the points: pressure (*grid) and traction (*grid, dim - 1) [stress] on the upper body, gap (*grid) and
-    slip (*grid, dim - 1) [length], and status (*grid): 0 open, 1 stick, 2 slip."""
+    """Make maps of the contact quantities on the grid of a half-space's points.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of a scene with a half-space, whose grid has (n0[, n1]) points.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    dict
+        'pressure' (n0[, n1]) and 'traction' (n0[, n1], dim - 1) on the upper body [stress]; 'gap' (n0[, n1]) and 'slip'
+        (n0[, n1], dim - 1) [length]; and 'status' (n0[, n1]), which is 0 where open, 1 where sticking and 2 where
+        slipping.
+
+    Raises
+    ------
+    InputError
+        If the scene has no half-space.
+    """
     problem, grid = reduction.problem, _half_space(reduction, None).grid
     r, areas = solution.reactions, problem.areas
     u, status = problem.displacements(r, solution.multipliers), contact_status(problem, r)
@@ -110,10 +169,28 @@ def surface_maps(reduction: Reduction, solution: Solution) -> dict[str, np.ndarr
 def subsurface_stress(
     reduction: Reduction, solution: Solution, depths: Sequence[float], body: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Stresses (j, *grid, 3, 3) and von Mises stresses (j, *grid) below the points of a half-space [stress].
+    """Compute the stresses below the points of a half-space.
 
-    depths  (j,) below the surface [length], at least half a spacing;  body  name of the half-space; None: the lower one, if both
-            bodies are half-spaces
+    Parameters
+    ----------
+    reduction
+        The reduction of a scene with a half-space, whose grid has (n0[, n1]) points.
+    solution
+        A solution of its problem.
+    depths
+        (j,) depths below the surface [length], at least half a spacing of the points.
+    body
+        Name of the half-space; by default the lower one, if both bodies are half-spaces.
+
+    Returns
+    -------
+    tuple
+        Stresses (j, n0[, n1], 3, 3) and von Mises stresses (j, n0[, n1]) [stress].
+
+    Raises
+    ------
+    InputError
+        If there is no such half-space, if it is periodic, or if a depth is too small.
     """
     found = _half_space(reduction, body)
     place = reduction.bodies.index(found)

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
+from contactopt.analysis.constants import RING, ROUNDNESS
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.chart import ON_PLANE
 
 SAME = 1e-5  # distances that differ by less than this fraction of an element belong to one ring of nodes
-RING = 0.75  # share of an element by which the next ring is further away at least
-ROUND = 1.5  # elements by which the edge of a disc may vary around it
 CENTRE = 1e-12  # relative change of a patch's edges at which its centre is known
 ROUNDS = 20  # of that iteration, which gains about two digits in each
 
@@ -26,12 +25,16 @@ Window = tuple[int, int]  # rings of nodes next to the edge: how many are left o
 
 @dataclass(frozen=True)
 class Ends:
-    """Where a patch begins and ends along its line [length]; `copies` of it make the whole zone."""
+    """Where a patch begins and ends along its line [length]; `copies` of it make the whole zone.
+
+    step  distance of neighbouring contacts next to its end [length]
+    """
 
     first: float
     last: float
     copies: int
     uncertainty: float
+    step: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +109,7 @@ class Patch:
         first, last, uncertainty = float(x.min()), float(x.max()), 0.0
         if self.centred:
             found = self._read(1.0, 0.0, read)
-            return None if found is None else Ends(-found[0], found[0], self.copies, found[1])
+            return None if found is None else Ends(-found[0], found[0], self.copies, found[1], self._step_at(last))
         for _ in range(ROUNDS):
             centre = (first + last) / 2
             left, right = self._read(-1.0, centre, read), self._read(1.0, centre, read)
@@ -116,7 +119,10 @@ class Patch:
             uncertainty = (left[1] + right[1]) / 2
             if max(abs(first - before[0]), abs(last - before[1])) <= CENTRE * (last - first):
                 break
-        return Ends(first, last, self.copies, uncertainty)
+        return Ends(first, last, self.copies, uncertainty, self._step_at(last))
+
+    def _step_at(self, edge: float) -> float:
+        return self.step(self.contact, self.place, edge)
 
     def _read(self, sign: float, centre: float, read: Callable[[End], list[float]]) -> tuple[float, float] | None:
         """Distance of one end from the centre and its uncertainty [length]."""
@@ -140,9 +146,21 @@ class Patch:
 
 
 def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> list[Patch]:
-    """The patches of the contacts `inside` (k,), some but not all; none where they are no disc on a surface.
+    """Find the connected patches of a zone on a contact surface.
 
-    weights  (k,) of the contacts in the mean place that is the centre of a disc
+    Parameters
+    ----------
+    problem
+        The interface problem of one pair of surfaces.
+    inside
+        (k,) mask of the contacts of the zone: some of them, but not all.
+    weights
+        (k,) weights of the contacts in the mean place that is the centre of a disc.
+
+    Returns
+    -------
+    list
+        The patches in their order along a contact line. On a surface one patch, or none where the zone is no disc.
     """
     if problem.dim == 3:
         disc = _disc(problem, inside, weights)
@@ -195,7 +213,7 @@ def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) ->
     distance = np.linalg.norm(x - centre[:, None], axis=0)
     disc = Patch(np.arange(problem.contacts), distance, inside, True, 1, x)
     step = disc.step(disc.contact, distance, float(distance[inside].max()))
-    return disc if abs(distance[~inside].min() - distance[inside].max()) <= ROUND * step else None
+    return disc if abs(distance[~inside].min() - distance[inside].max()) <= ROUNDNESS * step else None
 
 
 def _rings(depth: np.ndarray, step: float, count: int) -> list[float]:

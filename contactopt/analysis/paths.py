@@ -34,9 +34,12 @@ from contactopt.analysis.zone import solve_zone
 from contactopt.cards import card, count, line
 from contactopt.errors import InputError
 from contactopt.files import whole_folder
+from contactopt.interface.recovery import Fields
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.scenes.scene import Scene
+
+KEPT = 500_000  # displacement unknowns of all bodies, up to which every state of a path keeps them
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +50,8 @@ class State:
     displacements  u (k, dim), total: gap, tangential displacement [length];  slip (k, dim - 1) of this step [length]
     apart          (dim,) relative displacement of the bodies, had they no contact: minus approach, shift [length]
     elastic        elastic energy of both bodies; external: midpoint work of this step; contact: D [force length]
+    bodies         displacements (n,) of every body [length]; empty for bodies of more than KEPT unknowns, and for those on other
+                   ranks
     """
 
     scene: Scene
@@ -59,6 +64,7 @@ class State:
     elastic: float
     external: float
     contact: float
+    bodies: tuple[np.ndarray, ...] = ()
 
     @property
     def friction(self) -> float:
@@ -98,7 +104,18 @@ class PathResult:
         return replace(self.states[-1].solution, seconds=dict(seconds))
 
     def problem(self, step: int) -> InterfaceProblem:
-        """The static problem of one step, which its solution is certified against."""
+        """Make the static problem of one step, which its solution is certified against.
+
+        Parameters
+        ----------
+        step
+            The number of the state, from 0 on.
+
+        Returns
+        -------
+        InterfaceProblem
+            The problem with the gaps and resultants of that state.
+        """
         return replace(self.reduction.problem, q=self.states[step].q, s=self.states[step].s)
 
     @cached_property
@@ -123,10 +140,26 @@ class PathResult:
         history["energy_error"] = np.divide(error, largest, out=np.zeros_like(error), where=largest > 0)
         return history
 
-    def write(self, out: str | Path) -> None:
-        """history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and displacements (n, k, dim).
+    def fields(self, step: int) -> tuple[Fields, ...]:
+        """Displacement and stress of the elastic bodies at a state; empty where the state keeps no displacements."""
+        pairs = zip(self.reduction.bodies, self.states[step].bodies)
+        return tuple(found for body, U in pairs if (found := body.fields(U)) is not None)
 
-        It also has the bounds of the friction forces (n, k) and the status (n, k): 0 open, 1 stick, 2 slip.
+    def write(self, out: str | Path) -> None:
+        """Write history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and displacements (n, k, dim).
+
+        It also has the bounds of the friction forces (n, k), the status (n, k): 0 open, 1 stick, 2 slip, and the contact frames
+        (k, dim, dim), one direction per row, normal first.
+
+        Parameters
+        ----------
+        out
+            The folder, which is made if it does not exist.
+
+        Raises
+        ------
+        InputError
+            Where the files cannot be written.
         """
         problem = self.reduction.problem
         forces = [state.solution.reactions for state in self.states]
@@ -140,6 +173,7 @@ class PathResult:
                 staging / "path.npz",
                 coordinates=problem.coordinates,
                 areas=problem.areas,
+                frames=self.reduction.frames,
                 reactions=forces,
                 bounds=[problem.law.bound(r[:, 0]) for r in forces],
                 status=[mask.stick + 2 * mask.slip for mask in masks],
@@ -178,10 +212,10 @@ def follow(
     if not isinstance(scenes, Iterable) or isinstance(scenes, np.ndarray) or sp.issparse(scenes):
         raise InputError(f"a path is a list of scenes; got {type(scenes).__name__}.")
     method, tol = settings.pop("method", None), settings.pop("tol", 1e-8)
-    return follow_states(scenes, elements, zone, Options(Q, solver, method, tol, settings, note))
+    return _follow_states(scenes, elements, zone, Options(Q, solver, method, tol, settings, note))
 
 
-def follow_states(
+def _follow_states(
     scenes: Iterable[Scene], elements: int | None = None, zone: float | None = None, options: Options | None = None
 ) -> PathResult:
     """As follow(), with the options of contactopt.analysis.solve_scene."""
@@ -228,7 +262,7 @@ def solve_states(
     """
     if len(states) == 1:
         return solve_zone(states[0], elements, options, start)
-    path = follow_states(states, elements, None, options)
+    path = _follow_states(states, elements, None, options)
     return Solved(path.reduction, path.solution, path=path)
 
 
@@ -270,8 +304,14 @@ def _state(solved: Solved, before: State | None, last: _Mechanics | None) -> tup
         now.elastic,
         external=sum(float((F + F0) @ (U - U0)) for F, F0, U, U0 in zip(now.F, last.F, now.U, last.U)) / 2,
         contact=-float(np.sum((now.r + last.r) * (now.u - last.u))) / 2,
+        bodies=_kept(U),
     )
     return state, now
+
+
+def _kept(U: list[Any]) -> tuple[np.ndarray, ...]:
+    here = all(isinstance(own, np.ndarray) for own in U)
+    return tuple(U) if here and sum(own.size for own in U) <= KEPT else ()
 
 
 def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:

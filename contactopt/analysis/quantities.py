@@ -202,7 +202,7 @@ def _one_pair(reduction: Reduction) -> None:
         )
 
 
-def stick_ratio(reduction: Reduction, solution: Solution) -> tuple[float, float]:
+def _stick_ratio(reduction: Reduction, solution: Solution) -> tuple[float, float]:
     """Half-width of the stick zone over that of contact.
 
     Parameters
@@ -251,7 +251,7 @@ def uncertainty(name: str, reduction: Reduction, solution: Solution) -> float:
     float
         In the unit of the quantity; 0 where it has only one reading.
     """
-    return stick_ratio(reduction, solution)[1] if name == "stick" else 0.0
+    return _stick_ratio(reduction, solution)[1] if name == "stick" else 0.0
 
 
 # name -> function of a reduction and its solution
@@ -259,7 +259,7 @@ QUANTITIES: dict[str, Callable[[Reduction, Solution], float]] = {
     "pressure": peak_pressure,
     "width": width,
     "approach": _approach,
-    "stick": lambda *solved: stick_ratio(*solved)[0],
+    "stick": lambda *solved: _stick_ratio(*solved)[0],
     "energy": elastic_energy,
 }
 OF_ONE_PAIR = ("pressure", "width", "stick")  # these belong to a surface, not to the scene as a whole

@@ -13,6 +13,8 @@ from contactopt.interface.charts import SymmetryPlane
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution, alone
 
+ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and still lie along it
+
 
 @dataclass(frozen=True, eq=False)
 class Resultant:
@@ -27,13 +29,30 @@ class Resultant:
         return {"force": self.force.tolist(), "moment": self.moment.tolist()}
 
 
-def resultant(
+def _resultant(
     points: np.ndarray, forces: np.ndarray, axisymmetric: bool, planes: tuple[SymmetryPlane, ...]
 ) -> Resultant:
-    """Resultant of nodal forces (dim, m) at points (dim, m), those of all mirror images together or of whole rings.
+    """Compute the resultant of nodal forces, those of all mirror images together or of whole rings.
 
-    Mirror images across `planes` and the parts of a ring balance each other but for what acts along the planes and along
+    Mirror images across `planes` and the parts of a ring balance each other but for what acts along the planes and
+    along
     the axis.
+
+    Parameters
+    ----------
+    points
+        (dim, m) where the forces act [length].
+    forces
+        (dim, m) nodal forces, those of all mirror images together or of whole rings [force].
+    axisymmetric
+        Whether the points stand for rings, with components r and z.
+    planes
+        The planes of symmetry.
+
+    Returns
+    -------
+    Resultant
+        The force and its moment about the origin.
     """
     if axisymmetric:
         return Resultant(np.array([0.0, forces[1].sum()]), np.zeros(1))
@@ -47,7 +66,18 @@ def resultant(
 
 
 def planes_of(reduction: Reduction) -> tuple[SymmetryPlane, ...]:
-    """The planes of symmetry of a scene whose bodies are parts of the whole ones; none where they are whole."""
+    """Collect the planes of symmetry of a scene whose bodies are parts of the whole ones.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+
+    Returns
+    -------
+    tuple
+        Its planes, each once; none where the bodies are whole.
+    """
     if reduction.scene.copies == 1:
         return ()
     found: list[SymmetryPlane] = []
@@ -57,36 +87,113 @@ def planes_of(reduction: Reduction) -> tuple[SymmetryPlane, ...]:
     return tuple(found)
 
 
+def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
+    """Find the planes beyond which mirror images make the bodies whole.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene.
+
+    Returns
+    -------
+    list of dict
+        {"axis": name of a coordinate, "place": [length]} for every plane. The axis of revolution counts as one in its
+        section. The list is empty where the bodies are whole, and where a plane does not lie across an axis.
+    """
+    scene = reduction.scene
+    if scene.kind == "axisymmetric":
+        return [{"axis": scene.components[0], "place": 0.0}]
+    made = []
+    for plane in planes_of(reduction):
+        axis = int(np.argmax(np.abs(plane.inward)))
+        if abs(plane.inward[axis]) < 1 - ALONG:
+            return []
+        made.append({"axis": scene.components[axis], "place": float(plane.offset / plane.inward[axis]) + 0.0})
+    return made if 2 ** len(made) == scene.copies else []
+
+
 def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:
-    """Contact forces on the upper bodies in the coordinates of space, (dim, k)."""
+    """Turn the contact forces on the upper bodies into the coordinates of space.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene, with the frames of its k contacts.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    ndarray
+        (dim, k) contact forces [force].
+    """
     return np.asarray(np.einsum("kad,ka->dk", reduction.frames, solution.reactions))
 
 
 def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
-    """For every pair of surfaces the resultant of the contact forces on its upper body."""
+    """Compute for every pair of surfaces the resultant of the contact forces on its upper body.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    dict
+        The resultants by the names of the pairs.
+    """
     forces, points = space_forces(reduction, solution), reduction.problem.coordinates
     ring, planes = reduction.scene.kind == "axisymmetric", planes_of(reduction)
     return {
-        pair.name: resultant(points[:, pair.contacts], forces[:, pair.contacts], ring, planes)
+        pair.name: _resultant(points[:, pair.contacts], forces[:, pair.contacts], ring, planes)
         for pair in reduction.problem.pairs
     }
 
 
 def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
-    """For every support and plate, as "body 'name', support 'boundary'", the resultant of its forces on the body."""
+    """Compute for every support and plate the resultant of its forces on the body.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    dict
+        The resultants by names such as "body 'block', support 'bottom'".
+    """
     ring, planes = reduction.scene.kind == "axisymmetric", planes_of(reduction)
     found = {}
     displaced = reduction.displaced(solution)
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
         for name, (points, forces) in body.held_by(U, B.T @ solution.reactions.ravel()).items():
-            found[f"body '{body.name}', {name}"] = resultant(points, forces, ring, planes)
+            found[f"body '{body.name}', {name}"] = _resultant(points, forces, ring, planes)
     return found
 
 
 def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Solution]]:
-    """The reduction and solution of every pair by itself, for readers of its surface; the displacements of bodies need all pairs.
+    """Take the reduction and solution of every pair of surfaces by itself, for readers of its surface.
 
-    Where there is one pair only, it is all of the scene.
+    A view has no displacements of the bodies, since these need the forces of all pairs.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    list
+        A reduction and a solution for each pair. Where there is one pair only, they are those of the scene.
     """
     if len(reduction.problem.pairs) == 1:
         return [(reduction, solution)]
@@ -98,7 +205,21 @@ def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Sol
 
 
 def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
-    """`pairs` and `holders` of a summary: resultants, and for pairs forces, pressure and counts of contacts."""
+    """Make the tables `pairs` and `holders` of a summary.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    dict
+        'pairs': for each pair of surfaces its resultant, normal force [force], largest pressure [stress], half-widths
+        [length], coupling and counts of contacts. 'holders': the resultant of each support and plate.
+    """
     pairs = {}
     for (view, own), (name, found) in zip(views(reduction, solution), pair_resultants(reduction, solution).items()):
         problem, r = view.problem, own.reactions

@@ -92,16 +92,27 @@ def solve_scene(
 
     Parameters
     ----------
-    scene : what to solve
-    elements : across the contact half-width; the scene's own number by default
-    zone : half-width of contact that the mesh resolves [length]; the scene's first guess by default
-    options : how to solve it
-    start : the same scene solved on another mesh, to start from. Without one, where Newton's steps take products with Q,
+    scene
+        What to solve.
+    elements
+        Number across the contact half-width; the scene's own number by default.
+    zone
+        Half-width of contact that the mesh resolves [length]; the scene's first guess by default.
+    options
+        How to solve it.
+    start
+        The same scene solved on another mesh, to start from. Without one, where Newton's steps take products with Q,
         the scene is first solved on a coarser mesh, if its bodies can make one.
+
+    Returns
+    -------
+    Solved
+        The reduction and its solution. The solution says itself whether it is certified.
 
     Raises
     ------
-    InputError : on a scene that cannot be modelled, or options that do not fit
+    InputError
+        On a scene that cannot be modelled, or options that do not fit.
     """
     options = options or Options()
     if not isinstance(scene, Scene):

@@ -10,10 +10,12 @@ from scipy.spatial import KDTree
 
 from contactopt.analysis.resultants import space_forces
 from contactopt.analysis.status import contact_status
+from contactopt.bodies.elements import facet_nodes
 from contactopt.interface.recovery import Fields
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution
 from contactopt.scenes.scene import Part
+from contactopt.vtu import write_vtu
 
 NEAR = 1.5  # distances between contacts, beyond the gap, up to which a node of a body belongs to a contact
 CELLS = {2: "line", 3: "triangle", 4: "quad"}  # by their corners
@@ -55,14 +57,24 @@ class ContactFields:
 
     def write_vtu(self, path: Path) -> None:
         """The surface as a VTU file with its quantities at the contacts."""
-        import meshio
-
-        points = np.pad(self.points, ((0, 3 - len(self.points)), (0, 0))).T
-        meshio.Mesh(points, [(CELLS[len(self.cells)], self.cells.T)], self.data).write(path, file_format="vtu")
+        write_vtu(path, self.points.T, CELLS[len(self.cells)], self.cells.T, self.data)
 
 
 def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFields, ...]:
-    """The fields of every pair of surfaces."""
+    """Collect the contact quantities on the surface of every pair.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    tuple
+        The ContactFields of each pair, in the order of the pairs.
+    """
     problem, r = reduction.problem, solution.reactions
     u, areas = problem.displacements(r, solution.multipliers), problem.areas
     share = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)  # the contact on an axis has no area
@@ -90,20 +102,33 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
 def on_nodes(
     reduction: Reduction, fields: tuple[Fields, ...], surfaces: tuple[ContactFields, ...]
 ) -> tuple[Fields, ...]:
-    """The fields of the bodies with the contact quantities at the nodes of their contact surfaces, zero elsewhere.
+    """Put the contact quantities on the nodes of the bodies' contact surfaces. They are zero at all other nodes.
 
-    A node takes the values of the contact nearest to it; traction and slip of a lower body have the opposite sign.
+    A node takes the values of the contact nearest to it. Traction and slip of a lower body have the opposite sign.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    fields
+        The displacements and stresses of the bodies.
+    surfaces
+        The contact quantities of each pair, as `contact_fields` gives them.
+
+    Returns
+    -------
+    tuple
+        The fields of the bodies with the contact quantities added.
     """
     default = {part.name: part.contact for part in reduction.scene.parts if isinstance(part, Part)}
     made = []
     for body in fields:
-        data = {name: np.zeros((body.mesh.nvertices, *value.shape[1:])) for name, value in surfaces[0].data.items()}
+        data = {name: np.zeros((body.mesh.p.shape[1], *value.shape[1:])) for name, value in surfaces[0].data.items()}
         for pair, surface, coupling in zip(reduction.scene.pairs, surfaces, reduction.couplings):
             for side, (name, boundary) in enumerate(zip(pair.bodies, pair.surfaces)):
                 if name != body.name:
                     continue
-                facets = body.mesh.boundaries[boundary or default[name]]
-                nodes = np.unique(body.mesh.facets[:, facets])
+                nodes = facet_nodes(body.mesh, body.mesh.boundaries[boundary or default[name]])
                 tree = KDTree(surface.points.T)
                 spacing = tree.query(surface.points.T, k=min(2, len(surface.gap)))[0].reshape(len(surface.gap), -1)
                 apart, nearest = tree.query(body.mesh.p[:, nodes].T)

@@ -101,7 +101,7 @@ def press_fit(
         return material.E / (1 - material.nu**2), material.nu / (1 - material.nu)
 
     (M_h, m_h), (M_s, m_s) = plane(hub), plane(shaft)
-    softness = ((outside**2 + radius**2) / (outside**2 - radius**2) + m_h) / M_h
-    softness += ((radius**2 + bore**2) / (radius**2 - bore**2) - m_s) / M_s
-    p = interference / (radius * softness)
+    compliance = ((outside**2 + radius**2) / (outside**2 - radius**2) + m_h) / M_h
+    compliance += ((radius**2 + bore**2) / (radius**2 - bore**2) - m_s) / M_s
+    p = interference / (radius * compliance)
     return Reference("Lame", lambda x: np.full(np.shape(x), p), np.pi * radius, p)

@@ -212,7 +212,25 @@ def flat_punch_axisymmetric_bonded(force: float, radius: float, modulus: float, 
 
 
 def under_punch(value: Field, a: float, power: int, odd: bool = False) -> Field:
-    """x -> value(u) / (a^(power - 1) sqrt(a^2 - x^2)) with u = artanh(|x|/a); odd: times sign(x). nan if |x| >= a."""
+    """Make a traction under a punch from its bounded factor: value(u) / (a^(power - 1) sqrt(a^2 - x^2)), u = artanh(|x|
+    / a).
+
+    Parameters
+    ----------
+    value
+        A function of u (n,) that gives the bounded factor (n,).
+    a
+        Half-width of the punch [length].
+    power
+        The power of 1 / length that the traction has: 1 for a line, 2 for a disc.
+    odd
+        Whether the traction is odd in x. Then it is multiplied by the sign of x.
+
+    Returns
+    -------
+    callable
+        The traction (n,) as a function of places x (n,) [length]; it is nan where |x| >= a.
+    """
 
     def field(x: np.ndarray) -> np.ndarray:
         x = np.asarray(x, dtype=float)

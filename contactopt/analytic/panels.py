@@ -28,7 +28,7 @@ TRANSFORM = (legendre.legvander(NODES, ORDER - 1) * WEIGHTS[:, None] * (np.arang
 LEFT = ORDER // 2  # nodes of the central panel at v < 0
 
 
-def panel_edges(b: float) -> np.ndarray:
+def _panel_edges(b: float) -> np.ndarray:
     """Right ends of the panels, less b: equal panels from the centre, refined on both sides of b, ended at TAIL.
 
     The first panel is central: it reaches as far to the left of v = 0 as to its right.
@@ -57,7 +57,7 @@ class Panels:
 
     @cached_property
     def edges(self) -> np.ndarray:
-        return panel_edges(self.b)
+        return _panel_edges(self.b)
 
     @cached_property
     def half(self) -> np.ndarray:
@@ -185,7 +185,7 @@ class Panels:
         """Exact less Gauss rule for ln |u - v| or 1 / (u - v) on near panels; the Gauss rule leaves out u = v."""
         local = self._local()
         i, k = np.nonzero(np.abs(local) < NEAR)
-        moments = (log_moments if log else cauchy_moments)(local[i, k]) @ TRANSFORM
+        moments = (_log_moments if log else _cauchy_moments)(local[i, k]) @ TRANSFORM
         columns, half = k[:, None] * ORDER + np.arange(ORDER), self.half[k][:, None]
         distance = self.columns[LEFT:][i][:, None] - self.columns[columns]
         same = distance == 0
@@ -205,12 +205,12 @@ def _fold(full: np.ndarray, parity: int) -> np.ndarray:
     return folded
 
 
-def cauchy_moments(x: np.ndarray) -> np.ndarray:
+def _cauchy_moments(x: np.ndarray) -> np.ndarray:
     """int_-1^1 P_m(t) / (x - t) dt = 2 Q_m(x), (k, ORDER); the principal value inside. Source: DLMF 14.12.13."""
     return np.where(_away(x), _by_quadrature(x, log=False), 2 * _second_kind(x)[:, :ORDER])
 
 
-def log_moments(x: np.ndarray) -> np.ndarray:
+def _log_moments(x: np.ndarray) -> np.ndarray:
     """int_-1^1 P_m(t) ln |x - t| dt, (k, ORDER): primitives of the Cauchy moments, (2 m + 1) P_m = (P_m+1 - P_m-1)'."""
     second = _second_kind(x)
     higher = 2 * (second[:, 2:] - second[:, : ORDER - 1]) / (2 * np.arange(1, ORDER) + 1)

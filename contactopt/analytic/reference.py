@@ -119,12 +119,38 @@ def dundurs(upper: Material | None, lower: Material | None) -> tuple[float, floa
 
 
 def ellipse(x: np.ndarray, a: float, peak: float) -> np.ndarray:
-    """peak sqrt(1 - x^2 / a^2), zero outside."""
+    """Evaluate the half ellipse peak sqrt(1 - x^2 / a^2), which is zero outside of |x| < a.
+
+    Parameters
+    ----------
+    x
+        (n,) places [length].
+    a
+        The half-width [length].
+    peak
+        The value at x = 0 [stress].
+
+    Returns
+    -------
+    ndarray
+        (n,) values [stress].
+    """
     return np.asarray(peak * np.sqrt(np.maximum(0.0, 1 - np.square(np.asarray(x) / a))))
 
 
 def check_beta(beta: float) -> None:
-    """Raise InputError unless beta is a finite number of size below one, as for every pair of materials."""
+    """Check Dundurs' constant beta, which is less than one in size for every pair of materials.
+
+    Parameters
+    ----------
+    beta
+        The constant [-].
+
+    Raises
+    ------
+    InputError
+        Unless beta is a finite number between -1 and 1.
+    """
     check_number("Dundurs' constant beta", beta, low=-1.0, high=1.0)
 
 

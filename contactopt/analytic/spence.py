@@ -81,9 +81,29 @@ class UnitPunch:
 
 @lru_cache(maxsize=64)
 def unit_punch(mu: float, beta: float, axisymmetric: bool) -> UnitPunch:
-    """Solve for the stick zone; c/a within about 1e-7, tractions within about 1e-6 away from x = c and the edges.
+    """Solve for the stick zone under a rigid flat punch of unit half-width.
 
-    mu > 0, 0 < beta < 1. Raises InputError for other values.
+    The ratio c/a is within about 1e-7 of the exact one. The tractions are within about 1e-6 away from x = c and the
+    edges.
+
+    Parameters
+    ----------
+    mu
+        The friction coefficient, greater than 0.
+    beta
+        Dundurs' constant, between 0 and 1.
+    axisymmetric
+        Whether the punch is a disc. Otherwise it is a strip in plane strain.
+
+    Returns
+    -------
+    UnitPunch
+        The stick zone and the tractions.
+
+    Raises
+    ------
+    InputError
+        For values of mu and beta out of range.
     """
     from scipy.optimize import brentq
 
@@ -185,8 +205,8 @@ def _eliminate(pp: np.ndarray, pq: np.ndarray, qp: np.ndarray, qq: np.ndarray) -
 def _excess(punch: UnitPunch, mu: float) -> float:
     """q - mu p at the end of the stick zone: zero for the right one, positive where it is too large."""
     end = np.count_nonzero(punch.panels.stick)
-    last = slice(end - ORDER, end)
-    return float(np.sum(TRANSFORM @ (punch.q[last] - mu * punch.p[last])))
+    panel = slice(end - ORDER, end)
+    return float(np.sum(TRANSFORM @ (punch.q[panel] - mu * punch.p[panel])))
 
 
 def _uncoupled(mu: float, beta: float, axisymmetric: bool) -> float:

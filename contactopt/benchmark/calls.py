@@ -38,37 +38,69 @@ class Outcome:
 
 
 def no_answer(status: str, error: object, measured: dict[str, float] | None = None) -> dict[str, Any]:
-    """The message of a run that ended without an answer, in the form of contactopt.benchmark.measure.Answer."""
+    """Write the message of a run that ended without an answer, in the form of contactopt.benchmark.measure.Answer.
+
+    Parameters
+    ----------
+    status
+        How it ended, a word of the column `status`.
+    error
+        What was said, a text or an exception.
+    measured
+        Times and memory, as far as they are known.
+
+    Returns
+    -------
+    dict
+        The fields of Answer.
+    """
     blank = {"reactions": None, "multipliers": None, "label": "", "iterations": np.nan, "seconds": np.nan}
     return {"status": status, "message": one_line(error), "measured": measured or {}, "history": None, **blank}
 
 
 def measure(task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry) -> dict[str, Any]:
-    """Run the method; its answer, or how it failed, in the form of contactopt.benchmark.measure.Answer."""
+    """Run a method on a problem, and measure time and memory.
+
+    Parameters
+    ----------
+    task
+        The run and its limits.
+    problem
+        The interface problem.
+    start
+        The solution to start from, if there is one.
+    plugins
+        The methods of the user.
+
+    Returns
+    -------
+    dict
+        Its answer, or how it failed, in the form of contactopt.benchmark.measure.Answer.
+    """
     random.seed(task.seed)
     np.random.seed(task.seed)  # noqa: NPY002 (a plug-in may use the global generator)
-    measured = {"base_mb": reset_peak()}
+    measured = {"base_mb": _reset_peak()}
     wall, cpu = time.perf_counter(), time.process_time()
     try:
         outcome: Outcome | Exception = call(task, problem, start, plugins)
     except (Exception, SystemExit) as error:
         outcome = error if isinstance(error, Exception) else RuntimeError(f"it called exit({error})")
     measured |= {"call_seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}
-    measured["peak_mb"] = peak()
+    measured["peak_mb"] = _peak()
     if not isinstance(outcome, Outcome):
         kinds = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "backend_failed"}
         return no_answer(
             next((word for kind, word in kinds.items() if isinstance(outcome, kind)), "error"), outcome, measured
         )
     try:
-        return read_outcome(outcome, problem, measured)
+        return _read_outcome(outcome, problem, measured)
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
         return no_answer("error", f"its answer has the wrong form: {error}", measured)
 
 
-def read_outcome(outcome: Outcome, problem: InterfaceProblem, measured: dict[str, float]) -> dict[str, Any]:
+def _read_outcome(outcome: Outcome, problem: InterfaceProblem, measured: dict[str, float]) -> dict[str, Any]:
     """The message of an answer; TypeError or ValueError if it has the wrong form."""
-    r, lam = real(outcome.reactions), None if outcome.multipliers is None else real(outcome.multipliers)
+    r, lam = _real(outcome.reactions), None if outcome.multipliers is None else _real(outcome.multipliers)
     if r.size != problem.q.size:
         raise ValueError(f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}")
     if lam is not None and lam.shape != problem.s.shape:
@@ -83,11 +115,11 @@ def read_outcome(outcome: Outcome, problem: InterfaceProblem, measured: dict[str
         "label": outcome.label,
         "iterations": float(outcome.iterations),
         "seconds": seconds,
-        "history": thinned(outcome.history),
+        "history": _thinned(outcome.history),
     }
 
 
-def real(values: Any) -> np.ndarray:
+def _real(values: Any) -> np.ndarray:
     """The values as an array of floats of its own; TypeError or ValueError if they are not real numbers."""
     array = np.asarray(values)
     if np.iscomplexobj(array):
@@ -96,7 +128,18 @@ def real(values: Any) -> np.ndarray:
 
 
 def call(task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry) -> Outcome:
-    """Run the method; its own errors pass through."""
+    """Run a method on a problem. Its own errors pass through.
+
+    Parameters
+    ----------
+    task, problem, start, plugins
+        As for `measure`.
+
+    Returns
+    -------
+    Outcome
+        The answer of the method, with what it says of itself.
+    """
     spec, tol = task.run.method, None if task.run.setting == "default" else task.run.tolerance
     plugin = None if spec.name in METHODS else plugins.find(spec.name)
     if plugin is None or plugin.iterates:
@@ -127,7 +170,7 @@ def call(task: Task, problem: InterfaceProblem, start: Solution | None, plugins:
     return Outcome(reactions, multipliers, Status.SOLVED.label, label=spec.label)
 
 
-def thinned(history: tuple[dict[str, float], ...]) -> tuple[list[float], list[float], list[int]] | None:
+def _thinned(history: tuple[dict[str, float], ...]) -> tuple[list[float], list[float], list[int]] | None:
     """Residuals, seconds and iterations, at most POINTS of them, the last included; None without a history."""
     if not len(history):
         return None
@@ -138,7 +181,7 @@ def thinned(history: tuple[dict[str, float], ...]) -> tuple[list[float], list[fl
     return residuals, seconds, [int(i) + 1 for i in index]
 
 
-def reset_peak() -> float:
+def _reset_peak() -> float:
     """Forget the largest resident memory so far; the present one [MB], nan where the system does not tell."""
     try:
         with open("/proc/self/clear_refs", "w") as file:
@@ -148,7 +191,7 @@ def reset_peak() -> float:
         return np.nan
 
 
-def peak() -> float:
+def _peak() -> float:
     try:
         return _status("VmHWM")
     except OSError:

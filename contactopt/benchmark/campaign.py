@@ -33,13 +33,35 @@ def run_campaign(
     scheduler: str | None = None,
     quiet: bool = False,
 ) -> Path:
-    """Execute an experiment; returns the folder with its results, out/bench/NAME by default.
+    """Execute the runs of an experiment that are not finished yet.
 
-    jobs       worker processes; default: one per core
-    resume     go on where an interrupted campaign stopped: no finished run is repeated
-    filters    "COLUMN=PATTERN" on problem, method, setting, start or repeat; all must match
-    scheduler  address of a Dask scheduler, instead of local processes
-    Raises InputError on an experiment that cannot be run, or results in the folder without `resume`.
+    Parameters
+    ----------
+    experiment
+        An experiment file, or what `read_experiment` made of it.
+    out
+        The folder of the results; by default out/bench/NAME.
+    jobs
+        Number of worker processes; by default one per core.
+    resume
+        Whether to go on where an interrupted campaign stopped. No finished run is repeated.
+    filters
+        "COLUMN=PATTERN" on problem, method, setting, start or repeat; all must match.
+    scheduler
+        Address of a Dask scheduler, instead of local processes.
+    quiet
+        Whether no progress is shown.
+
+    Returns
+    -------
+    Path
+        The folder of the results.
+
+    Raises
+    ------
+    InputError
+        On an experiment that cannot be run, filters that no run matches, results in the folder without `resume`, and a
+        folder that cannot be written to.
     """
     require("pandas", "pyarrow", "tqdm")
     if not isinstance(experiment, Experiment):
@@ -78,12 +100,33 @@ def run_reports(
     jobs: int | None = None,
     quiet: bool = False,
 ) -> Path:
-    """Rebuild all reports from their tables; returns the page with all of them.
+    """Rebuild all reports from their tables.
 
-    version  "": solve nothing.  "full": run the experiments first and renew their tables in `reports`.  "quick": run their
-             quick versions, with tables and reports in out/quick, so that `reports` stays as it is
-    names    stems of the experiment files to run; all by default
-    Experiments whose problems or methods are all missing here are left out, with a note. Raises InputError as run_campaign.
+    Experiments whose problems or methods are all missing here are left out, with a note.
+
+    Parameters
+    ----------
+    experiments
+        The experiment files.
+    reports
+        The folder of the reports, with the table of each.
+    version
+        '': solve nothing. 'full': run the experiments first and renew their tables in `reports`. 'quick': run their
+        quick versions, with tables and reports in out/quick, so that `reports` stays as it is.
+    names
+        Stems of the experiment files to run; all by default.
+    jobs, quiet
+        As for `run_campaign`.
+
+    Returns
+    -------
+    Path
+        The page with all reports.
+
+    Raises
+    ------
+    InputError
+        On an unknown version or name, two experiments of one name, and as `run_campaign` and `build` raise it.
     """
     paths = [Path(path) for path in experiments]
     missing = set(names) - {path.stem for path in paths}

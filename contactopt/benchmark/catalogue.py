@@ -44,9 +44,24 @@ class Catalogue:
 
 
 def read_catalogue(paths: Sequence[str], names: Sequence[str]) -> Catalogue:
-    """What these plug-in files declare, and the entry points among these names of methods.
+    """Read what plug-in files declare, and the entry points among names of methods, in a process of its own.
 
-    Raises InputError, naming the file, if one of them fails, hangs, or ends the process.
+    Parameters
+    ----------
+    paths
+        The plug-in files.
+    names
+        The methods that the experiment names.
+
+    Returns
+    -------
+    Catalogue
+        Methods and problems with their laws and arguments.
+
+    Raises
+    ------
+    InputError
+        If a plug-in fails, hangs or ends the process. The message names the file.
     """
     asked = [name for name in dict.fromkeys(names) if name not in METHODS]
     if not paths and not asked:
@@ -76,18 +91,56 @@ def _checked(arguments: Any) -> Arguments:
 
 
 def bind(arguments: Arguments, *values: Any, **given: Any) -> None:
-    """TypeError, as from the call itself, unless these values fit the arguments."""
+    """Check that values fit the arguments of a plug-in.
+
+    Parameters
+    ----------
+    arguments
+        What the plug-in declared.
+    values, given
+        Arguments by their place and by their name.
+
+    Raises
+    ------
+    TypeError
+        If they do not, as from the call itself.
+    """
     parameters = [P(name, KINDS[kind], default=None if default else P.empty) for name, kind, default in arguments]
     inspect.Signature(parameters).bind(*values, **given)
 
 
 def arguments_of(function: Callable[..., Any]) -> Arguments:
+    """List the arguments of a function as plain data.
+
+    Parameters
+    ----------
+    function
+        Any function or class.
+
+    Returns
+    -------
+    tuple
+        For each argument its name, the number of its kind in KINDS, and whether it has a default.
+    """
     parameters = inspect.signature(function).parameters.values()
     return tuple((p.name, KINDS.index(p.kind), p.default is not P.empty) for p in parameters)
 
 
 def declare(paths: Sequence[str], names: Sequence[str]) -> dict[str, Any]:
-    """Load plug-ins and list what they declare; runs in the process of its own. {"error": sentence} if one fails."""
+    """Load plug-ins and list what they declare. It runs in the process of its own.
+
+    Parameters
+    ----------
+    paths
+        The plug-in files.
+    names
+        The methods to look for among the entry points.
+
+    Returns
+    -------
+    dict
+        'methods' and 'problems' as plain data, or 'error' with a sentence if a plug-in fails.
+    """
     try:
         plugins = Registry()
         plugins.load(paths)

@@ -96,9 +96,24 @@ def _filter(text: str) -> Any:
 
 
 def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
-    """The experiment in a TOML file, `quick`: with its quick version's keys.
+    """Read an experiment file.
 
-    Raises InputError, naming file and line, on anything that cannot be run.
+    Parameters
+    ----------
+    path
+        The TOML file.
+    quick
+        Whether the keys of its quick version replace the others.
+
+    Returns
+    -------
+    Experiment
+        The problems, methods and settings, checked.
+
+    Raises
+    ------
+    InputError
+        On anything that cannot be run. The message names file and line.
     """
     path = Path(path)
     try:
@@ -191,7 +206,7 @@ class _Reader:
             number *= len(data.get(key, ("default",)))
         for table in ("problems", "methods"):
             entries = [entry for entry in data[table] if isinstance(entry, dict)]
-            number *= max(1, sum(math.prod(map(size_of, entry.values())) for entry in entries))
+            number *= max(1, sum(math.prod(map(_size_of, entry.values())) for entry in entries))
         if number > MOST_RUNS:
             raise self.located(
                 f"these are {number} runs, more than {MOST_RUNS} in one experiment; split it, or take fewer repeats "
@@ -249,7 +264,7 @@ class _Reader:
         choices = []
         for key, value in rest.items():
             try:
-                choices.append(values_of(key, value))
+                choices.append(_values_of(key, value))
             except InputError as error:
                 raise self.located(str(error), table, index, key) from error
         for name, *values in product(names, *choices):
@@ -300,7 +315,7 @@ class _Reader:
         return InputError(f"{where}: {message.rstrip('.')}.")
 
 
-def size_of(value: Any) -> int:
+def _size_of(value: Any) -> int:
     """How many values a list or a range stands for, without making them."""
     if isinstance(value, dict):
         steps = value.get("steps")
@@ -308,7 +323,7 @@ def size_of(value: Any) -> int:
     return len(value) if isinstance(value, list) else 1
 
 
-def values_of(name: str, value: Any) -> list[Any]:
+def _values_of(name: str, value: Any) -> list[Any]:
     """One value, a list of them, or a range {from, to, steps, scale = "linear" or "log"}."""
     if isinstance(value, list) and not value:
         raise InputError(f"the list '{name}' is empty")

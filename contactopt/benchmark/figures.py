@@ -17,6 +17,7 @@ from contactopt.benchmark.style import (
     FLOOR,
     LEAST_RESIDUAL,
     NAMES,
+    WIDTH,
     add_legend,
     label_ends,
     make_figure,
@@ -39,12 +40,27 @@ def speed_accuracy(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Time against certified residual: per method a line through its settings, medians over problems and repeats.
+    """Draw time against certified residual: per method a line through its settings, medians over problems and repeats.
 
-    Filled: at least half of the runs kept the tolerance. The Pareto front, where nothing is both faster and more accurate,
-    is drawn in grey. A residual below FLOOR of its tolerance is drawn at FLOOR. Labels stand where the lines end, too.
+    Filled: at least half of the runs kept the tolerance. The Pareto front, where nothing is both faster and more
+    accurate, is drawn in grey. A residual below FLOOR of its tolerance is drawn at FLOOR. Labels stand where the lines
+    end, too.
 
-    labels  name of a method -> the short label that it gets
+    Parameters
+    ----------
+    table
+        The rows.
+    time
+        The column with the times [s].
+    by
+        The column whose values have a line each.
+    labels
+        Short labels by the names of methods.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
     """
     figure, ax = make_figure()
     points, ends = [], []
@@ -88,9 +104,27 @@ def performance_profile(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Dolan-More profile: share of the instances solved within a factor of the best method's time on each.
+    """Draw a profile: the share of the instances solved within a factor of the best method's time on each.
 
-    An instance is a problem at a setting and start; medians over repeats, and a method that fails once has failed.
+    An instance is a problem at a setting and start. Times are medians over repeats, and a method that fails once has
+    failed.
+
+    Source: Dolan, More (2002), Benchmarking optimization software with performance profiles, Math. Program. 91,
+    201-213.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    metric
+        The column with the times [s].
+    by, labels
+        As for `speed_accuracy`.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
     """
     figure, ax = make_figure()
     times = table[metric].where(table["success"], np.inf)
@@ -118,7 +152,7 @@ def performance_profile(
         xscale="log",
         xlim=(1, largest),
         ylim=(0, 1.03),
-        xlabel=f"ratio: {what} / that of the best method on the instance [-]",
+        xlabel=f"ratio: {what} / the best method's [-]",
     )
     ax.set_ylabel(f"share of the {len(wide)} instances solved")
     return add_legend(figure, ax, "method (solved)")
@@ -131,7 +165,24 @@ def time_against_size(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Median time of successful runs against size, with the exponent p of time ~ size^p from the larger half of the sizes."""
+    """Draw the median time of successful runs against size, with the exponent p of time ~ size^p from the larger sizes.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    size
+        The column with the sizes.
+    metric
+        The column with the times [s].
+    by, labels
+        As for `speed_accuracy`.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
+    """
     figure, ax = make_figure()
     ends = []
     look = {name: style for (name, _), style in zip(groups(table, by), styles())}
@@ -150,7 +201,18 @@ def time_against_size(
 
 
 def fitted_exponent(x: np.ndarray, y: np.ndarray) -> float:
-    """p of y ~ x^p by least squares over the larger half of the sizes, three at least; nan with fewer."""
+    """Fit the exponent p of y ~ x^p by least squares over the larger half of the sizes, three at least.
+
+    Parameters
+    ----------
+    x, y
+        (n,) sizes and times.
+
+    Returns
+    -------
+    float
+        The exponent; nan with fewer than three sizes.
+    """
     if len(x) < 3:
         return np.nan
     order = np.argsort(x)[-max(3, (len(x) + 1) // 2) :]
@@ -164,20 +226,35 @@ def stability_map(
     value: str = "success",
     by: str = "method",
 ) -> Any:
-    """One panel per method: success, iterations, error or time over two parameters; hatched grey where no run succeeded.
+    """Draw one panel per method: success, iterations, error or time over two parameters; hatched grey where no run
+    succeeded.
 
-    The cells hold their numbers, unless a map has more than CELLS of them.
+    The cells hold their numbers, unless a map has more than CELLS of them. Runs that ended by the method's own
+    criterion above the tolerance ("settled") show their value too. Where one axis is the friction coefficient and the
+    experiment diagnosed its problems, lines on top: below the dashed one the alternating iteration contracts for every
+    load, at the full one it does not for some load.
 
-    Runs that ended by the method's own criterion above the tolerance ("settled") show their value too.
+    Parameters
+    ----------
+    table
+        The rows.
+    x, y
+        The columns of the two parameters.
+    value
+        The column that is shown.
+    by
+        The column whose values have a panel each.
 
-    Where one axis is the friction coefficient and the experiment diagnosed its problems, lines on top: below the dashed one
-    the alternating iteration contracts for every load, at the full one it does not for some load.
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
     """
     from matplotlib.colors import LogNorm, Normalize
 
     parts = groups(table, by)
-    columns = min(4, len(parts))
-    figure, axes = make_figure(columns, -(-len(parts) // columns), size=(3.0, 2.9) if len(parts) > 1 else (6.4, 3.6))
+    columns = min(2, len(parts))
+    figure, axes = make_figure(columns, -(-len(parts) // columns), (WIDTH / columns, 2.5 if columns > 1 else 3.8))
     grids = [(name, rows, _grid(rows, x, y, value)) for name, rows in parts]
     shown = np.concatenate([grid.to_numpy(float).ravel() for _, _, grid in grids])
     shown = shown[np.isfinite(shown) & (shown > 0)]
@@ -186,7 +263,7 @@ def stability_map(
     for number, (ax, (name, rows, grid)) in enumerate(zip(np.ravel(axes), grids)):
         ax.set_facecolor("#cccccc")
         ax.patch.set(hatch="xx", edgecolor="#999999")
-        write_numbers(ax, grid, norm)
+        write_numbers(ax, grid, norm, 7 if columns > 1 else 8)
         mesh = ax.imshow(grid.to_numpy(float), norm=norm, cmap="viridis", origin="lower", aspect="auto")
         ax.set_title(name, fontsize=9)
         ax.set_xlabel(NAMES.get(x, x), fontsize=8 if len(parts) > 1 else None)
@@ -201,9 +278,9 @@ def stability_map(
         ax.set_axis_off()
     handles = {line.get_label(): line for ax in np.ravel(axes) for line in ax.get_lines()}
     if handles:
-        figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=2, frameon=False, fontsize=8)
+        figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=1, frameon=False, fontsize=8)
     label = "share of runs solved" if value == "success" else NAMES.get(value, value) + ", median"
-    figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
+    figure.colorbar(mesh, ax=axes, label=label, location="top", shrink=0.8, aspect=30)
     return figure
 
 
@@ -242,7 +319,27 @@ def convergence(
     by: str = "method",
     labels: Mapping[str, str] = MappingProxyType({}),
 ) -> Any:
-    """Natural-map residual after each outer iteration, or against `x` = "seconds"; the first repeat of each method."""
+    """Draw the natural-map residual after each outer iteration, or against time, of the first repeat of each method.
+
+    Parameters
+    ----------
+    table
+        The rows, with their histories.
+    x
+        "iterations" or "seconds".
+    by, labels
+        As for `speed_accuracy`.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
+
+    Raises
+    ------
+    InputError
+        For another `x`.
+    """
     if x not in ("iterations", "seconds"):
         raise InputError("convergence histories are drawn against 'iterations' or 'seconds'.")
     figure, ax = make_figure()

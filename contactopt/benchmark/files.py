@@ -11,10 +11,25 @@ from contactopt.errors import InputError
 
 
 def subfolder(parent: Path, name: str) -> Path:
-    """The folder parent/name. It need not exist.
+    """Name a folder inside another. It need not exist.
 
-    Raises InputError if the name can lead out of `parent`, or if it is a symbolic link there: the folder behind a link
-    was not given by the user, so nothing is written or removed in it.
+    Parameters
+    ----------
+    parent
+        The folder that the user gave.
+    name
+        The name of the folder in it.
+
+    Returns
+    -------
+    Path
+        parent/name.
+
+    Raises
+    ------
+    InputError
+        If the name can lead out of `parent`, or if it is a symbolic link there: the folder behind a link was not given
+        by the user, so nothing is written or removed in it.
     """
     check_name("the name", name)
     folder = parent / name
@@ -27,7 +42,25 @@ def subfolder(parent: Path, name: str) -> Path:
 
 @contextmanager
 def told(place: Path, advice: str = "choose another directory") -> Iterator[None]:
-    """Turn an OSError within the block, as of a full disk, into one sentence with what to do."""
+    """Turn an OSError within the block, as of a full disk, into one sentence with what to do.
+
+    Parameters
+    ----------
+    place
+        Where something is written.
+    advice
+        What to do.
+
+    Yields
+    ------
+    None
+        Nothing.
+
+    Raises
+    ------
+    InputError
+        Where the block raises an OSError.
+    """
     try:
         yield
     except OSError as error:

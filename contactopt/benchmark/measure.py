@@ -100,7 +100,18 @@ def _history(value: Any) -> tuple[list[float], list[float], list[int]] | None:
 
 
 def blank(task: Task) -> dict[str, Any]:
-    """The row of a run of which nothing is known yet but what it is."""
+    """Make the row of a run of which nothing is known yet but what it is.
+
+    Parameters
+    ----------
+    task
+        The run and its limits.
+
+    Returns
+    -------
+    dict
+        A value for every column, with status 'error'.
+    """
     run = task.run
     return {
         "schema": SCHEMA,
@@ -139,20 +150,20 @@ def blank(task: Task) -> dict[str, Any]:
         "peak_mb": np.nan,
         "base_mb": np.nan,
         "history": "[]",
-        "versions": versions(),
-        "machine": machine(),
+        "versions": _versions(),
+        "machine": _machine(),
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
 
 @cache
-def versions() -> str:
+def _versions() -> str:
     packages = ", ".join(f"{name} {version(name)}" for name in ("contactopt", "numpy", "scipy"))
     return f"Python {platform.python_version()}, {packages}"
 
 
 @cache
-def machine() -> str:
+def _machine() -> str:
     model = platform.processor() or platform.machine()
     try:
         with open("/proc/cpuinfo") as file:
@@ -163,9 +174,21 @@ def machine() -> str:
 
 
 def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, Any]:
-    """The part of the row that follows from an answer: certificate and status.
+    """Judge an answer by its certificate. The method's own word counts only where it admits failure.
 
-    The method's own word counts only where it admits failure.
+    Parameters
+    ----------
+    task
+        The run and its limits.
+    problem
+        The interface problem.
+    answer
+        What the method returned.
+
+    Returns
+    -------
+    dict
+        The columns of the row that follow from the answer.
     """
     out: dict[str, Any] = {"message": answer.message, **answer.measured}
     out["time"] = datetime.now(UTC).isoformat(timespec="seconds")
@@ -192,5 +215,20 @@ def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, An
 
 
 def associated_residual(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray | None) -> float:
-    """The certificate of the same problem under the associated law."""
+    """Compute the certificate of the same problem under the associated law.
+
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    r
+        (k, dim) contact forces, normal first [force].
+    lam
+        (p,) multipliers; None: those that fit best.
+
+    Returns
+    -------
+    float
+        The natural-map residual [-].
+    """
     return natural_map_residual(replace(problem, law=Associated(problem.mu)), r, lam)

@@ -139,7 +139,18 @@ def _body(layout: Layout, static: str) -> str:
 
 
 def refusals(table: pd.DataFrame) -> list[str]:
-    """One sentence for each reason why runs were refused or could not be built, with their number."""
+    """Say in a sentence each why runs were refused or could not be built, with their number.
+
+    Parameters
+    ----------
+    table
+        The table of a campaign.
+
+    Returns
+    -------
+    list
+        The sentences, the most frequent reason first.
+    """
     left = table[table["status"].isin(["refused", "not_built"])]
     reasons = Counter(str(message) for message in left["message"])
     return [

@@ -73,15 +73,33 @@ _receiving: ContextVar[Registry | None] = ContextVar("receiving", default=None)
 
 
 def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -> Any:
-    """Declare a function or class as a method of the benchmark, under its own name or `name`.
+    """Declare a function or class as a method of the benchmark.
 
     The declaration counts where a campaign runs the file. Everywhere else the function or class is returned as it is.
 
-    A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s], `max_iterations` and `start`
-    (a Solution or None) are passed if it has such arguments, `tol` not at the setting "default" if it has a default. It
-    returns reactions (k, dim), or (reactions, multipliers), or a Solution. Returning claims success; raising
-    does not, and InputError means that the problem is not one for this method.
-    law  "coulomb", or "associated" for the convex relaxation: rows are judged by, and profiles compare within, one law
+    A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s], `max_iterations` and
+    `start` (a Solution or None) are passed if it has such arguments, `tol` not at the setting "default" if it has a
+    default. It returns reactions (k, dim), or (reactions, multipliers), or a Solution. Returning claims success;
+    raising does not, and InputError means that the problem is not one for this method.
+
+    Parameters
+    ----------
+    make
+        The function or class, where the decorator is written without arguments.
+    name
+        The name of the method; by default that of the function.
+    law
+        "coulomb", or "associated" for the convex relaxation: rows are judged by, and profiles compare within, one law.
+
+    Returns
+    -------
+    callable
+        The function or class itself, or a decorator that returns it.
+
+    Raises
+    ------
+    InputError
+        For an unknown law, and for the name of a method of contactopt.
     """
     if law not in LAWS:
         raise InputError(f"law must be one of {', '.join(LAWS)}; got {law!r}.")
@@ -99,7 +117,26 @@ def method(make: Any = None, *, name: str | None = None, law: str = "coulomb") -
 
 
 def problem(make: Any = None, *, name: str | None = None) -> Any:
-    """Declare a function of named parameters that returns an InterfaceProblem, for `family = NAME`."""
+    """Declare a function of named parameters that returns an InterfaceProblem, for `family = NAME` in an experiment
+    file.
+
+    Parameters
+    ----------
+    make
+        The function, where the decorator is written without arguments.
+    name
+        The name of the family; by default that of the function.
+
+    Returns
+    -------
+    callable
+        The function itself, or a decorator that returns it.
+
+    Raises
+    ------
+    InputError
+        For a name that cannot be used.
+    """
 
     def register(make: Any) -> Any:
         found, registry = _name("problem", make, name), _receiving.get()

@@ -213,7 +213,20 @@ class Shares:
 
 
 def run_locally(tasks: Sequence[Task], jobs: int) -> Iterator[dict[str, Any]]:
-    """Rows as they are finished, by `jobs` worker processes. When the iteration is left, the workers are killed."""
+    """Execute runs by worker processes of this machine. When the iteration is left, the workers are killed.
+
+    Parameters
+    ----------
+    tasks
+        The runs.
+    jobs
+        Number of worker processes.
+
+    Yields
+    ------
+    dict
+        The row of each run as it is finished.
+    """
     shares, rows, stop = Shares(tasks), queue.Queue[Any](), threading.Event()
     workers = [Worker() for _ in range(min(jobs, len(tasks)))]
 
@@ -245,7 +258,7 @@ def run_locally(tasks: Sequence[Task], jobs: int) -> Iterator[dict[str, Any]]:
 _of_thread = threading.local()
 
 
-def run_here(task: Task) -> dict[str, Any]:
+def _run_here(task: Task) -> dict[str, Any]:
     """One run, in a worker process that belongs to the calling thread: what a Dask worker executes."""
     if not hasattr(_of_thread, "worker"):
         _of_thread.worker = Worker()
@@ -253,10 +266,27 @@ def run_here(task: Task) -> dict[str, Any]:
 
 
 def run_on_cluster(tasks: Sequence[Task], address: str) -> Iterator[dict[str, Any]]:
-    """Rows as they are finished, by the Dask cluster whose scheduler is at `address`.
+    """Execute runs by a Dask cluster.
 
-    Each thread of each Dask worker keeps a worker process of its own. Plug-in and FCLib files must be found under the same
-    paths there. A run whose Dask worker is lost leaves no row: resume the campaign. Raises InputError without the cluster.
+    Each thread of each Dask worker keeps a worker process of its own. Plug-in and FCLib files must be found under the
+    same paths there. A run whose Dask worker is lost leaves no row: resume the campaign.
+
+    Parameters
+    ----------
+    tasks
+        The runs.
+    address
+        Of the Dask scheduler.
+
+    Yields
+    ------
+    dict
+        The row of each run as it is finished.
+
+    Raises
+    ------
+    InputError
+        If Dask is not installed, or no scheduler answers.
     """
     try:
         from distributed import Client, as_completed
@@ -271,9 +301,9 @@ def run_on_cluster(tasks: Sequence[Task], address: str) -> Iterator[dict[str, An
         ahead = 4 * max(1, sum(client.nthreads().values()))  # more would only fill the scheduler's memory
         running = as_completed([], raise_errors=False)
         for task in islice(waiting, ahead):
-            running.add(client.submit(run_here, task, pure=False))
+            running.add(client.submit(_run_here, task, pure=False))
         for future in running:
             for task in islice(waiting, 1):
-                running.add(client.submit(run_here, task, pure=False))
+                running.add(client.submit(_run_here, task, pure=False))
             if future.status == "finished":
                 yield future.result()

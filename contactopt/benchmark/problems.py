@@ -71,13 +71,42 @@ class ProblemSpec:
 
 
 def short_number(value: Any) -> str:
-    """A float in the fewest characters that give it back; anything else as text."""
+    """Write a float in the fewest characters that give it back, and anything else as text.
+
+    Parameters
+    ----------
+    value
+        Any value.
+
+    Returns
+    -------
+    str
+        The text.
+    """
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
 def scene(name: str, **parameters: Any) -> Scene:
-    """The named scene. Besides its own arguments: upper_E, upper_nu, lower_E, lower_nu, and stiffness_ratio, which is
-    the lower body's Young's modulus over the upper one's."""
+    """Make a named scene, with other materials if they are given.
+
+    Parameters
+    ----------
+    name
+        A name in SCENES.
+    parameters
+        The scene's own arguments, and upper_E, upper_nu, lower_E, lower_nu, and stiffness_ratio, which is the lower
+        body's Young's modulus over the upper one's.
+
+    Returns
+    -------
+    Scene
+        The scene.
+
+    Raises
+    ------
+    InputError
+        For arguments that the scene does not have, or that contradict each other.
+    """
     given = {key: parameters.pop(key) for key in MATERIALS if key in parameters}
     made = make_scene(name, **parameters)
     if not given:
@@ -97,15 +126,48 @@ def scene(name: str, **parameters: Any) -> Scene:
 
 
 def reduced(name: str, **parameters: Any) -> InterfaceProblem:
-    """With explicit Q."""
+    """Reduce a named scene to its interface problem with explicit Q.
+
+    Parameters
+    ----------
+    name, parameters
+        As for `scene`.
+
+    Returns
+    -------
+    InterfaceProblem
+        The problem.
+    """
     from contactopt.interface.reduction import reduce
 
     return reduce(scene(name, **parameters), Q="explicit")
 
 
 def rigid_bodies(bodies: int = 10, contacts: int = 30, mu: float = 0.5, seed: int = 0) -> InterfaceProblem:
-    """Random rigid bodies and contact frames: Q = H' M^-1 H of rank at most 6 bodies, q = H' v, so that a solution
-    exists."""
+    """Draw random rigid bodies and contact frames: Q = H' M^-1 H of rank at most 6 bodies, q = H' v, so that a solution
+    exists.
+
+    Parameters
+    ----------
+    bodies
+        Number of bodies, at least two.
+    contacts
+        Number of contacts.
+    mu
+        Friction coefficient.
+    seed
+        Of the random numbers.
+
+    Returns
+    -------
+    InterfaceProblem
+        The problem.
+
+    Raises
+    ------
+    InputError
+        With fewer than two bodies or one contact.
+    """
     if bodies < 2 or contacts < 1:
         raise InputError("rigid_bodies needs at least two bodies and one contact.")
     rng = np.random.default_rng(seed)
@@ -123,12 +185,27 @@ def rigid_bodies(bodies: int = 10, contacts: int = 30, mu: float = 0.5, seed: in
 
 
 def half_plane(contacts: int = 64, mu: float = 0.5, coupling: float = 0.0) -> InterfaceProblem:
-    """A parabola pressed on an elastic half-plane: the dense logarithmic kernel of piecewise constant tractions.
+    """Press a parabola on an elastic half-plane: the dense logarithmic kernel of piecewise constant tractions.
 
-    Units: half the candidate zone and the plane's modulus pi E* / 2 are one. The load, by a plate, makes about half of the
-    candidate nodes touch. coupling: Dundurs' constant, in (-.5, .5), by which tangential tractions move the surface
-    normally; at 0 friction has nothing to do and only the normal problem is left.
+    Half the candidate zone and the plane's modulus pi E* / 2 are the units. The load, by a plate, makes about half of
+    the candidate nodes touch.
+
     Source: Johnson (1985), Contact Mechanics, eqs (2.30).
+
+    Parameters
+    ----------
+    contacts
+        Number of candidate nodes.
+    mu
+        Friction coefficient.
+    coupling
+        Dundurs' constant, in (-.5, .5), by which tangential tractions move the surface normally. At 0 friction has
+        nothing to do and only the normal problem is left.
+
+    Returns
+    -------
+    InterfaceProblem
+        The problem.
     """
     h = 2.0 / contacts
     x = -1.0 + h * (np.arange(contacts) + 0.5)
@@ -155,12 +232,31 @@ def half_plane(contacts: int = 64, mu: float = 0.5, coupling: float = 0.0) -> In
 
 
 def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) -> InterfaceProblem:
-    """Friction of the scene `of` under given normal forces (Tresca's problem), as a contact problem without coupling.
+    """Make the friction of a scene under given normal forces (Tresca's problem) a contact problem without coupling.
 
     Normal forces p are those without friction. The scene's Q_tt, and per contact u_n = (r_n - p) c with its own
     normal compliance c, so that r_n = p solves the normal part exactly; plates are held. The tangential displacement at
     no force is that of the scene under p, and a drag along the first axis that would need the force shear * mu * p if
     nothing slipped.
+
+    Parameters
+    ----------
+    of, parameters
+        The name of the scene and its arguments, as for `scene`.
+    mu
+        Friction coefficient.
+    shear
+        The drag, over the one at which every contact slips.
+
+    Returns
+    -------
+    InterfaceProblem
+        The problem.
+
+    Raises
+    ------
+    InputError
+        If the normal problem is not solved.
     """
     from contactopt.solving.driver import solve
 
@@ -184,7 +280,20 @@ def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) 
 
 
 def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
-    """The scene `of` in which every contact is listed `copies` times: forces are shared, Q is rank-deficient."""
+    """List every contact of a scene several times: forces are shared, and Q is rank-deficient.
+
+    Parameters
+    ----------
+    of, parameters
+        The name of the scene and its arguments, as for `scene`.
+    copies
+        How often each contact is listed.
+
+    Returns
+    -------
+    InterfaceProblem
+        The problem.
+    """
     p = reduced(of, **parameters)
     index = np.repeat(np.arange(p.q.size).reshape(p.q.shape), copies, axis=0).ravel()
     return InterfaceProblem(
@@ -199,7 +308,20 @@ def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
 
 
 def in_units(of: str, force: float = 1.0, length: float = 1.0, **parameters: Any) -> InterfaceProblem:
-    """The scene `of` with its numbers written in other units: one newton is `force`, one millimetre is `length` of them."""
+    """Write a scene's numbers in other units.
+
+    Parameters
+    ----------
+    of, parameters
+        The name of the scene and its arguments, as for `scene`.
+    force, length
+        What one newton and one millimetre are in the other units.
+
+    Returns
+    -------
+    InterfaceProblem
+        The problem.
+    """
     p = reduced(of, **parameters)
     return replace(
         p,
@@ -221,9 +343,28 @@ FAMILIES: dict[str, Callable[..., InterfaceProblem]] = {
 
 
 def named(kind: str, name: str, parameters: Mapping[str, Any], folder: Path) -> list[ProblemSpec]:
-    """The problems behind one entry: one, or every file that an FCLib pattern matches.
+    """Find the problems behind one entry: one, or every file that an FCLib pattern matches.
 
-    Raises InputError if a pattern uses a variable that is not set, or matches nothing.
+    Parameters
+    ----------
+    kind
+        'scene', 'fclib' or 'family'.
+    name
+        The name of the scene or family, or a pattern of files.
+    parameters
+        The arguments of the problem.
+    folder
+        The folder to which a pattern is relative.
+
+    Returns
+    -------
+    list
+        The problems, files in the order of their names.
+
+    Raises
+    ------
+    InputError
+        For an unknown scene, and if a pattern uses a variable that is not set or matches nothing.
     """
     if kind == "scene" and name not in SCENES:
         raise InputError(f"unknown scene {name!r}; choose from {', '.join(SCENES)}.")

@@ -156,6 +156,17 @@ class Process:
 
 
 def one_line(error: object) -> str:
-    """A text, or an exception with its name unless it is an InputError, in one line of at most 200 characters."""
+    """Write a text, or an exception with its name unless it is an InputError, in one line of at most 200 characters.
+
+    Parameters
+    ----------
+    error
+        The text or exception.
+
+    Returns
+    -------
+    str
+        The line.
+    """
     text = str(error) if isinstance(error, str | InputError) else f"{type(error).__name__}: {error}"
     return " ".join(text.split())[:200]

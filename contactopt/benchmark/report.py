@@ -60,7 +60,7 @@ USUAL = (
 OWN_KEYS = ("kind", "caption", "where", "optional")  # of a figure; all others are arguments of its function
 LEFT_OUT = ("key", "label", "base_mb", "history")  # of a report's table
 PAGE = "benchmarks.html"
-DPI, SHADES = 90, 256
+DPI, SHADES = 120, 256
 QUESTIONS = (
     "Which chart answers which question? Speed against accuracy shows what a certified residual costs. A performance profile shows where methods "
     "fail, at its right end, and which is fast, at its left. A table of times by start shows what warm starts buy. A map shows for which numbers a "
@@ -90,7 +90,23 @@ class Layout:
 
 
 def read_layout(path: str | Path) -> Layout:
-    """InputError, naming the file, if it cannot be read or asks for a figure that does not exist."""
+    """Read how the report of an experiment is laid out.
+
+    Parameters
+    ----------
+    path
+        The experiment file.
+
+    Returns
+    -------
+    Layout
+        Title, text, figures and tables of the report.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or asks for a figure that does not exist. The message names it.
+    """
     path = Path(path)
     try:
         data = tomllib.loads(path.read_text())
@@ -122,7 +138,27 @@ def read_layout(path: str | Path) -> Layout:
 
 
 def publish(experiment: str | Path, results: str | Path, reports: str | Path) -> Path:
-    """Take the small table of a campaign over into REPORTS/NAME/rows.csv; returns its path."""
+    """Take the small table of a campaign over into REPORTS/NAME/rows.csv.
+
+    Parameters
+    ----------
+    experiment
+        The experiment file.
+    results
+        The folder of the campaign.
+    reports
+        The folder of the reports.
+
+    Returns
+    -------
+    Path
+        The table.
+
+    Raises
+    ------
+    InputError
+        As `read_layout`, `load` and `save` raise it.
+    """
     layout = read_layout(experiment)
     kept = {"history"} if any(entry["kind"] == "convergence" for entry in layout.figures) else set()
     columns = [*layout.columns] or [name for name in COLUMNS if name not in LEFT_OUT or name in kept]
@@ -132,9 +168,24 @@ def publish(experiment: str | Path, results: str | Path, reports: str | Path) ->
 
 
 def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
-    """Rebuild the report of every experiment that has a table in `reports`, and the page with all; returns its path.
+    """Rebuild the report of every experiment that has a table in `reports`, and the page with all.
 
-    Raises InputError if none has one, or if a figure's arguments do not fit its table.
+    Parameters
+    ----------
+    experiments
+        The experiment files.
+    reports
+        The folder of the reports.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    InputError
+        If none has a table, or if a figure's arguments do not fit its table.
     """
     require("markdown_it", "pandas")
     reports, errors = Path(reports), []
@@ -164,19 +215,39 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> Path:
 
 
 def write_report(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
-    """Write report.md with its pictures into a folder; returns its Markdown. InputError if a figure does not fit the table."""
-    parts = [f"# {one_line(layout.title)}", inert(layout.text.strip())]
+    """Write report.md with its pictures into a folder.
+
+    Parameters
+    ----------
+    layout
+        How the report is laid out.
+    folder
+        Where it goes.
+    table
+        The rows of the experiment.
+
+    Returns
+    -------
+    str
+        The Markdown of the report.
+
+    Raises
+    ------
+    InputError
+        If a figure does not fit the table.
+    """
+    parts = [f"# {_one_line(layout.title)}", _inert(layout.text.strip())]
     if layout.findings:
-        parts.append("\n".join(f"{n}. {inert(text)}" for n, text in enumerate(_findings(layout, table), 1)))
+        parts.append("\n".join(f"{n}. {_inert(text)}" for n, text in enumerate(_findings(layout, table), 1)))
     remove_files(folder, [old.name for old in folder.glob("figure-*.png")])
     for number, entry in enumerate(layout.figures or USUAL, 1):
         result = _drawn(layout, number, entry, table)
         if result is None:
             continue
         if entry["kind"] in TABLES:
-            parts += [markdown(result), f"*Table {number}. {one_line(entry['caption'])}*"]
+            parts += [_markdown(result), f"*Table {number}. {_one_line(entry['caption'])}*"]
         else:
-            picture, caption = folder / f"figure-{number}.png", one_line(entry["caption"])
+            picture, caption = folder / f"figure-{number}.png", _one_line(entry["caption"])
             image = _png(result)
             replace_file(picture, lambda file, image=image: file.write_bytes(image))  # type: ignore[misc]
             parts += [f"![{_plain(caption)}]({picture.name})", f"*Figure {number}. {caption}*"]
@@ -236,42 +307,42 @@ def _foot(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
     lines = [
         f"{len(table)} runs, of which {failures} did not keep their tolerance. Every success is a certificate recomputed from "
         "the problem.",
-        f"Wall over CPU time of the calls: median {(table['call_seconds'] / table['cpu_seconds']).median():.1f} (more than 1: a busy "
-        "machine; CPU times are compared, time limits are wall).",
+        f"The median of wall time over CPU time of the calls is {(table['call_seconds'] / table['cpu_seconds']).median():.1f}. More "
+        "than 1 means a busy machine. CPU times are compared, and time limits are wall times.",
         f"Experiment: [`{layout.path.name}`]({link}); table: [`{name}`]({name}).",
         f"Made by {again}."
         if kept
         else "Made by `contactopt bench`; rebuilt from the table by `contactopt report` with this folder.",
-        one_line(
+        _one_line(
             f"Environment: {'; '.join(sorted(set(table['machine'])))}. {'; '.join(sorted(set(table['versions'])))}. One BLAS thread."
         ),
     ]
     return "\n".join(lines + ([f"Backends: {', '.join(backends)}."] if backends else []))
 
 
-def markdown(table: pd.DataFrame) -> str:
+def _markdown(table: pd.DataFrame) -> str:
     """A table in Markdown; numbers with three significant digits."""
 
     def text(value: Any) -> str:
-        return f"{value:.3g}" if isinstance(value, float) else literal(str(value))
+        return f"{value:.3g}" if isinstance(value, float) else _literal(str(value))
 
     rows = [[text(v) for v in row] for row in table.itertuples(index=False)]
-    lines = [[literal(str(c)) for c in table.columns], ["---"] * len(table.columns), *rows]
+    lines = [[_literal(str(c)) for c in table.columns], ["---"] * len(table.columns), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def inert(text: object) -> str:
+def _inert(text: object) -> str:
     """Markdown in which raw HTML is text: a `<` that could open a tag is written as an entity."""
     return re.sub(r"<(?=[A-Za-z/!?])", "&lt;", str(text))
 
 
-def one_line(text: object) -> str:
-    return inert(" ".join(str(text).split()))
+def _one_line(text: object) -> str:
+    return _inert(" ".join(str(text).split()))
 
 
-def literal(text: str) -> str:
+def _literal(text: str) -> str:
     """The text in a cell of a table: no HTML, no link, no picture, no end of the cell."""
-    return one_line(text).replace("|", "\\|").replace("](", "]\\(")
+    return _one_line(text).replace("|", "\\|").replace("](", "]\\(")
 
 
 def _png(figure: Any) -> bytes:
@@ -285,7 +356,18 @@ def _png(figure: Any) -> bytes:
 
 
 def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
-    """One HTML page of reports (layout, folder, Markdown). It stands alone and holds no script."""
+    """Make one HTML page of reports. It stands alone and holds no script.
+
+    Parameters
+    ----------
+    bodies
+        Layout, folder and Markdown of each report.
+
+    Returns
+    -------
+    str
+        The HTML.
+    """
     links = "".join(
         f'<li><a href="#{html.escape(layout.name)}">{html.escape(layout.title)}</a></li>' for layout, _, _ in bodies
     )
@@ -299,7 +381,22 @@ def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
 
 
 def rendered(text: str, folder: Path) -> str:
-    """Markdown as HTML: pictures of the report embedded, raw HTML shown as text, links only to the web and the page."""
+    """Make HTML of Markdown, with the pictures of the report embedded.
+
+    Raw HTML is shown as text, and links lead only to the web and within the page.
+
+    Parameters
+    ----------
+    text
+        The Markdown.
+    folder
+        Where its pictures are.
+
+    Returns
+    -------
+    str
+        The HTML.
+    """
     from markdown_it import MarkdownIt
 
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")

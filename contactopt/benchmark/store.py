@@ -97,7 +97,18 @@ _log = logging.getLogger(__name__)
 
 
 def require(*modules: str) -> None:
-    """InputError with what to install if one of the benchmark layer's own dependencies is missing."""
+    """Check that packages of the benchmark layer are installed.
+
+    Parameters
+    ----------
+    modules
+        Names of modules.
+
+    Raises
+    ------
+    InputError
+        If one is missing, with what to install.
+    """
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
         raise InputError(f"benchmarks need {', '.join(missing)}; install with: pip install 'contactopt[benchmark]'")
@@ -169,7 +180,25 @@ class Store:
 
 
 def lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The rows of a rows.jsonl. Lines that are no rows are left out, with a warning: their runs count as not made."""
+    """Read the rows of a rows.jsonl.
+
+    Lines that are no rows are left out, with a warning: their runs count as not made.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Yields
+    ------
+    dict
+        A row.
+
+    Raises
+    ------
+    InputError
+        If a row has a newer schema.
+    """
     bad = 0
     with open(path, "rb") as file:
         for line in file:
@@ -181,7 +210,7 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
                 raise InputError(
                     f"'{path}' was written by a newer version (schema {row['schema']}); update contactopt."
                 )
-            if is_row(row):
+            if _is_row(row):
                 yield row
             else:
                 bad += 1
@@ -189,7 +218,7 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
         _log.warning("'%s': %d lines are no rows of a campaign and are left out", path, bad)
 
 
-def is_row(row: Any) -> bool:
+def _is_row(row: Any) -> bool:
     """Whether it has every column that a run fills, each of its type."""
     if not isinstance(row, dict) or not isinstance(row.get("answer", ""), str):
         return False
@@ -203,18 +232,44 @@ def is_row(row: Any) -> bool:
 
 
 def pack(reactions: np.ndarray) -> str:
+    """Write forces as text, in base64.
+
+    Parameters
+    ----------
+    reactions
+        (k, dim) contact forces.
+
+    Returns
+    -------
+    str
+        The text of their bytes.
+    """
     return base64.b64encode(np.ascontiguousarray(reactions, dtype=float).tobytes()).decode()
 
 
-def unpack(text: str) -> np.ndarray:
+def _unpack(text: str) -> np.ndarray:
     return np.frombuffer(base64.b64decode(text))
 
 
 def load(path: str | Path) -> pd.DataFrame:
-    """The table of a campaign: its folder, or a rows.jsonl, .parquet or .csv. One row per run, columns as COLUMNS.
+    """Read the table of a campaign, one row for each run, with the columns COLUMNS.
 
     Parameters of the problem and settings of the method are added as columns problem.NAME and method.NAME.
-    Raises InputError if there is no table, or one of a newer schema.
+
+    Parameters
+    ----------
+    path
+        The folder of the campaign, or a rows.jsonl, .parquet or .csv.
+
+    Returns
+    -------
+    DataFrame
+        The table.
+
+    Raises
+    ------
+    InputError
+        If there is no table, if it cannot be read, or if it has a newer schema.
     """
     require("pandas", "pyarrow")
     import pandas as pd
@@ -260,12 +315,12 @@ def _from_lines(path: Path) -> pd.DataFrame:
             known = best.get(row["fingerprint"])
             if known is None or row["residual"] < known["residual"]:
                 best[row["fingerprint"]] = row
-    reference = {fingerprint: unpack(row["answer"]) for fingerprint, row in best.items()}
+    reference = {fingerprint: _unpack(row["answer"]) for fingerprint, row in best.items()}
     for row in rows.values():
         answer, row["error"] = row.pop("answer", ""), np.nan
         if answer and row["fingerprint"] in reference:
             exact = reference[row["fingerprint"]]
-            found, size = unpack(answer), float(np.linalg.norm(exact))
+            found, size = _unpack(answer), float(np.linalg.norm(exact))
             if size > 0 and found.shape == exact.shape:
                 row["error"] = float(np.linalg.norm(found - exact)) / size
     types = {"int": "int64", "str": "str", "float": "float64", "bool": "bool"}
@@ -274,9 +329,21 @@ def _from_lines(path: Path) -> pd.DataFrame:
 
 
 def save(table: pd.DataFrame, path: str | Path, columns: list[str] | None = None) -> None:
-    """Write a table as .parquet or .csv, complete or not at all; `columns` of COLUMNS, all by default.
+    """Write a table as .parquet or .csv, complete or not at all.
 
-    Raises InputError if it cannot be written, as on a full disk.
+    Parameters
+    ----------
+    table
+        The rows.
+    path
+        The file, whose ending says the format.
+    columns
+        Some of COLUMNS; all by default.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written, as on a full disk.
     """
     path = Path(path)
     chosen = table[[c for c in (columns or COLUMNS) if c in table]]

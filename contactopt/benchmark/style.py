@@ -15,10 +15,13 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 MARKERS = "osD^vP*X<>hpd8H1"  # one for each of 16 methods; colours come back after eight, with other lines
 FLOOR = 1e-2  # residuals below this fraction of the tolerance asked for are drawn there: they answer no question
 LEAST_RESIDUAL = 1e-17  # drawn in place of 0
-NEAR_X, NEAR_Y = 60.0, 11.0  # pixels between labels that would run into each other
+WIDE, TALL = 5.4, 11.0  # pixels of a character of a label, and between labels one above the other
 POINTS = 0.72  # of a pixel at the usual resolution of a figure
+SHORT = 20  # characters of a label, up to which three of them fit side by side below a figure
 LONGEST = 26  # characters of a label
 MOST_ROUNDS = 20  # of sixteen methods in one figure
+WIDTH = 5.6  # of a figure [inch], so that its letters can be read where it is 400 pixels wide
+ROW = 0.19  # of a legend [inch]
 CELLS = 240  # of a map, above which no numbers are written into them
 NAMES = {
     "solve_seconds": "time of the method [s]",
@@ -41,7 +44,13 @@ NAMES = {
 
 
 def styles() -> list[dict[str, Any]]:
-    """Sixteen that differ in marker, and in colour or line; they come back after that."""
+    """Make the styles of lines.
+
+    Returns
+    -------
+    list
+        Sixteen that differ in marker, and in colour or line; they come back after that.
+    """
     made = [
         {"color": COLOURS[i % len(COLOURS)], "marker": MARKERS[i], "ls": "-" if i < len(COLOURS) else "--"}
         for i in range(len(MARKERS))
@@ -50,9 +59,22 @@ def styles() -> list[dict[str, Any]]:
 
 
 def short_label(name: str, labels: Mapping[str, str] = MappingProxyType({})) -> str:
-    """The label that was given for a name; else the name itself, where it is long with the values of its settings only.
+    """Shorten the label of a line.
 
-    normal_qp(backend='clarabel', exact=True) becomes 'normal_qp clarabel exact'.
+    It is the label that was given for a name; else the name itself, where it is long with the values of its settings
+    only. normal_qp(backend='clarabel', exact=True) becomes 'normal_qp clarabel exact'.
+
+    Parameters
+    ----------
+    name
+        The name of a method with its settings.
+    labels
+        Labels that the experiment gives.
+
+    Returns
+    -------
+    str
+        The label.
     """
     if name in labels:
         return str(labels[name])
@@ -68,20 +90,45 @@ def short_label(name: str, labels: Mapping[str, str] = MappingProxyType({})) -> 
 
 
 def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """The names of lines in their colours beside their last points (x, y, name, colour), one above the other where they meet."""
+    """Write the names of lines in their colours beside their last points, one above the other where they meet.
+
+    A name stands to the left of a point in the right half of the figure, to the right of any other.
+
+    Parameters
+    ----------
+    ax
+        The axes.
+    ends
+        (x, y, name, colour) of each line.
+    """
     ax.autoscale_view()
-    taken: list[tuple[float, float]] = []  # places of labels in pixels
+    middle = float(ax.transAxes.transform((0.5, 0.5))[0])
+    taken: list[tuple[float, float, float]] = []  # left and right end and height of labels in pixels
     for x, y, name, colour in sorted(ends, key=lambda end: end[1]):
         across, up = (float(place) for place in ax.transData.transform((x, y)))
-        shift = 3.0
-        while any(abs(across - other) < NEAR_X and abs(up + shift - height) < NEAR_Y for other, height in taken):
-            shift += NEAR_Y
-        taken.append((across, up + shift))
-        ax.annotate(name, (x, y), (5, shift * POINTS), textcoords="offset points", color=colour, fontsize=7)
+        left = across - WIDE * len(name) if across > middle else across
+        right, shift = left + WIDE * len(name), 3.0
+        while any(left < end and start < right and abs(up + shift - height) < TALL for start, end, height in taken):
+            shift += TALL
+        taken.append((left, right, up + shift))
+        side = {"ha": "right", "xytext": (-5, shift * POINTS)} if across > middle else {"xytext": (5, shift * POINTS)}
+        ax.annotate(name, (x, y), textcoords="offset points", color=colour, fontsize=7, **side)
 
 
-def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any) -> None:
-    """The numbers of a map in its cells, black on light colours and white on dark ones."""
+def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:
+    """Write the numbers of a map in its cells, black on light colours and white on dark ones.
+
+    Parameters
+    ----------
+    ax
+        The axes.
+    grid
+        The numbers, row by row.
+    norm
+        What takes a number to its place between the darkest and the lightest colour.
+    size
+        Of the letters [pt].
+    """
     values = grid.to_numpy(float)
     if values.size > CELLS:
         return
@@ -89,11 +136,24 @@ def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any) -> None:
         if np.isfinite(value):
             colour = "black" if float(norm(max(value, norm.vmin))) > 0.6 else "white"
             text = short_tick(float(f"{value:.0f}" if 10 <= abs(value) < 1000 else f"{value:.1g}"))
-            ax.text(column, row, text, ha="center", va="center", fontsize=6, color=colour)
+            ax.text(column, row, text, ha="center", va="center", fontsize=size, color=colour)
 
 
-def make_figure(columns: int = 1, rows: int = 1, size: Sequence[float] = (7.6, 4.4)) -> tuple[Any, Any]:
-    """A figure and its axes, of that size each [inch]."""
+def make_figure(columns: int = 1, rows: int = 1, size: Sequence[float] = (WIDTH, 4.0)) -> tuple[Any, Any]:
+    """Make a figure with axes.
+
+    Parameters
+    ----------
+    columns, rows
+        Number of axes.
+    size
+        Width and height of one of them [inch].
+
+    Returns
+    -------
+    tuple
+        The figure, and its axes: one, or an array of them.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
@@ -101,7 +161,13 @@ def make_figure(columns: int = 1, rows: int = 1, size: Sequence[float] = (7.6, 4
 
 
 def set_ticks(axis: Any) -> None:
-    """At 1, 2, 5 on a logarithmic axis of less than two decades, where the usual labels run into each other."""
+    """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades, where the usual labels run into each other.
+
+    Parameters
+    ----------
+    axis
+        The axis.
+    """
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_view_interval()
@@ -112,17 +178,50 @@ def set_ticks(axis: Any) -> None:
 
 
 def add_legend(figure: Any, ax: Any, title: str | None = None) -> Any:
-    """The figure with a grid and a legend beside it."""
+    """Add a grid, and a legend below the figure, which grows for it.
+
+    Parameters
+    ----------
+    figure, ax
+        The figure and its axes.
+    title
+        Of the legend.
+
+    Returns
+    -------
+    Figure
+        The figure.
+    """
     ax.grid(alpha=0.3)
     handles, labels = ax.get_legend_handles_labels()
     if handles:
+        columns = 2 if max(len(label) for label in labels) > SHORT else 3
+        figure.set_figheight(figure.get_figheight() + ROW * (-(-len(labels) // columns) + (title is not None)))
         figure.legend(
-            handles, labels, loc="outside right upper", frameon=False, fontsize=8, title=title, title_fontsize=8
+            handles,
+            labels,
+            loc="outside lower center",
+            ncols=columns,
+            frameon=False,
+            fontsize=8,
+            title=title,
+            title_fontsize=8,
         )
     return figure
 
 
 def short_tick(value: float) -> str:
-    """100000.0 -> 1e5"""
+    """Write a number as short as it can be: 100000.0 becomes 1e5.
+
+    Parameters
+    ----------
+    value
+        The number.
+
+    Returns
+    -------
+    str
+        The text.
+    """
     plain, power = f"{value:g}", f"{value:.1e}".replace(".0e", "e").replace("e+0", "e").replace("e-0", "e-")
     return power if len(power) < len(plain) and float(power) == value else plain

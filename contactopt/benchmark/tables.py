@@ -17,9 +17,26 @@ SHIFT = 1e-3  # s, of shifted geometric means
 
 
 def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFrame:
-    """The rows of one law whose columns have the given values (a value or a list of them; "": none).
+    """Choose the rows of one law whose columns have given values.
 
-    Raises InputError on an unknown column, or if no row is left.
+    Parameters
+    ----------
+    table
+        The rows.
+    law
+        The law; '' for all.
+    where
+        For a column a value or a list of them; '' stands for no value.
+
+    Returns
+    -------
+    DataFrame
+        The rows that are left, at least one.
+
+    Raises
+    ------
+    InputError
+        On an unknown column, or if no row is left.
     """
     rows = table[table["law"] == law] if law else table
     for column, value in where.items():
@@ -33,7 +50,22 @@ def select(table: pd.DataFrame, law: str = "coulomb", **where: Any) -> pd.DataFr
 
 
 def success_table(table: pd.DataFrame, by: str = "method", across: str = "setting") -> pd.DataFrame:
-    """Percent of the runs that kept the tolerance; of all, the percent with a right claim; the ways of failing."""
+    """Count the runs that kept the tolerance, those with a right claim, and the ways of failing.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    by
+        The column whose values have a row each.
+    across
+        The column whose values have a column each.
+
+    Returns
+    -------
+    DataFrame
+        Percentages and failures.
+    """
     import pandas as pd
 
     groups(table, across)  # complains if there is no such column
@@ -53,10 +85,24 @@ def success_table(table: pd.DataFrame, by: str = "method", across: str = "settin
 def time_table(
     table: pd.DataFrame, metric: str = "solve_seconds", by: str = "method", across: str = "setting"
 ) -> pd.DataFrame:
-    """Shifted geometric mean of times, a failure counted at its time limit; over the least; median and quartiles [s].
+    """Compute the shifted geometric mean of times, a failure counted at its time limit, with median and quartiles.
 
-    With shift sh = 1 ms: exp(mean(log(t + sh))) - sh. The last column: median over instances of the spread
+    With shift sh = 1 ms it is exp(mean(log(t + sh))) - sh. The last column is the median over instances of the spread
     (largest - least) / median of repeats.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    metric
+        The column with the times [s].
+    by, across
+        The columns whose values have a row each.
+
+    Returns
+    -------
+    DataFrame
+        Times [s], and the mean over the least one.
     """
     import pandas as pd
 
@@ -77,7 +123,25 @@ def time_table(
 
 
 def groups(table: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
-    """(name, rows) sorted by name, settings from the loosest to the tightest. InputError if there is no such column."""
+    """Split a table into groups, sorted by name; settings from the loosest to the tightest.
+
+    Parameters
+    ----------
+    table
+        The rows.
+    by
+        The column whose values are the names.
+
+    Returns
+    -------
+    list
+        The name and the rows of each group.
+
+    Raises
+    ------
+    InputError
+        If there is no such column.
+    """
     if by not in table:
         raise InputError(f"the table has no column {by!r}.")
     found = [(str(name), rows) for name, rows in table.groupby(by, sort=True)]

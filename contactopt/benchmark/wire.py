@@ -112,7 +112,23 @@ def _is_data(kind: type) -> bool:
 
 
 def read(data: bytes) -> Any:
-    """The data in a message from a process in which code of the user may run. ForeignMessage on anything else."""
+    """Read the data in a message from a process in which code of the user may run.
+
+    Parameters
+    ----------
+    data
+        The bytes of the message.
+
+    Returns
+    -------
+    object
+        Plain data, arrays, and data classes of contactopt.problem.
+
+    Raises
+    ------
+    ForeignMessage
+        On anything else.
+    """
     try:
         return _DataOnly(io.BytesIO(data)).load()
     except ForeignMessage:

@@ -51,7 +51,7 @@ class Runner:
 
     def execute(self, task: Task, problem: InterfaceProblem | None) -> dict[str, Any]:
         """The answer to one task, on a new problem or the one kept."""
-        limit_memory(task.memory_limit)
+        _limit_memory(task.memory_limit)
         self.note("solve")
         if problem is not None:
             self.problem, self.start = problem, None
@@ -100,7 +100,7 @@ class Builder:
 
     def build(self, spec: ProblemSpec, paths: tuple[str, ...], diagnosed: bool, memory_limit: float) -> dict[str, Any]:
         """The problem with the seconds that it took and its diagnosis, or {"error": sentence}."""
-        limit_memory(memory_limit)
+        _limit_memory(memory_limit)
         try:
             self.plugins.load(paths)
             begin = time.perf_counter()
@@ -113,13 +113,13 @@ class Builder:
             return {
                 "problem": problem,
                 "build_seconds": seconds,
-                "diagnosis": diagnosis(problem) if diagnosed else {},
+                "diagnosis": _diagnosis(problem) if diagnosed else {},
             }
         except (Exception, SystemExit) as error:
             return {"error": one_line(error)}
 
 
-def diagnosis(problem: InterfaceProblem) -> dict[str, float]:
+def _diagnosis(problem: InterfaceProblem) -> dict[str, float]:
     from contactopt.analysis.diagnosis import diagnose
 
     found = diagnose(problem)
@@ -132,7 +132,7 @@ def diagnosis(problem: InterfaceProblem) -> dict[str, float]:
     }
 
 
-def die_with_parent(parent: int) -> None:
+def _die_with_parent(parent: int) -> None:
     """Linux: the kernel kills this process when the thread that started it ends, however that happens."""
     if sys.platform == "linux":
         import ctypes
@@ -142,7 +142,7 @@ def die_with_parent(parent: int) -> None:
             os._exit(1)
 
 
-def limit_memory(gigabytes: float) -> None:
+def _limit_memory(gigabytes: float) -> None:
     import resource
 
     for kind in (resource.RLIMIT_DATA, resource.RLIMIT_CORE):
@@ -166,7 +166,7 @@ ROLES: dict[str, Callable[[Note], Callable[..., Any]]] = {
 
 def main() -> None:
     """Serve requests (word, *arguments) with messages (word, "phase" or "answer", content) until the socket closes."""
-    die_with_parent(int(sys.argv[2]))
+    _die_with_parent(int(sys.argv[2]))
     channel, own = Channel(socket.socket(fileno=int(sys.argv[1]))), os.getpid()
     word = ""
     serve = ROLES[sys.argv[3]](lambda phase: channel.send((word, "phase", phase)))

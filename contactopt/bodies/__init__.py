@@ -27,7 +27,7 @@ BODIES: dict[type, tuple[str, str, str]] = {
 
 
 def assemble(scene: Scene, part: Any, elements: int, zone: float | None) -> AssembledBody:
-    """The body that models one part of a scene.
+    """Assemble the body that models one part of a scene.
 
     Parameters
     ----------
@@ -35,6 +35,11 @@ def assemble(scene: Scene, part: Any, elements: int, zone: float | None) -> Asse
         The scene and one of its parts.
     elements, zone
         Number of elements across the contact half-width, and the half-width that the mesh resolves [length].
+
+    Returns
+    -------
+    AssembledBody
+        The body as matrices, whose linear system is not solved yet.
 
     Raises
     ------

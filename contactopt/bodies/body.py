@@ -121,9 +121,27 @@ class Assembly:
 
 
 def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Assembly:
-    """Mesh and assemble one Part of a Scene."""
+    """Mesh and assemble one elastic part of a scene.
+
+    Parameters
+    ----------
+    scene, part
+        The scene and one of its parts.
+    elements, zone
+        Number of elements across the contact half-width, and the half-width that the mesh resolves [length].
+
+    Returns
+    -------
+    Assembly
+        Stiffness [force / length], loads [force], held and driven unknowns, contact nodes and free motions.
+
+    Raises
+    ------
+    InputError
+        For a mesh that cannot be used, such as one in several pieces, and for supports and loads that do not fit.
+    """
     mesh = part.build_mesh(elements, zone)
-    _check_mesh(scene, part, mesh)
+    check_mesh(scene, part, mesh)
     axisymmetric = scene.kind == "axisymmetric"
     factor = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}[scene.kind] * scene.copies
     weight = (factor, axisymmetric)
@@ -160,14 +178,49 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
 
 
 def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
-    """The same body under the load values of another scene; InputError if other unknowns are held or driven there."""
+    """Put the loads of another scene on a body.
+
+    Parameters
+    ----------
+    body
+        The assembled body.
+    scene, part
+        The other scene, and its part that stands for the same body.
+
+    Returns
+    -------
+    Assembly
+        The same body with other load values.
+
+    Raises
+    ------
+    InputError
+        If other unknowns are held or driven there.
+    """
     prescribed, held, motion, plate_forces, *_ = _constraints(scene, part, body.basis)
     if not np.array_equal(np.flatnonzero(~held), body.free) or not np.array_equal(motion, body.motion):
         raise InputError(f"body '{part.name}': supports or plates hold other unknowns than before; reduce it anew.")
     return replace(body, load=_load(part, body.basis, body.weight), prescribed=prescribed, plate_forces=plate_forces)
 
 
-def _check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
+def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
+    """Check that a part's mesh fits the kind of the scene and has all boundaries that are named.
+
+    Parameters
+    ----------
+    scene
+        The scene of the part.
+    part
+        An elastic body of the scene.
+    mesh
+        Its mesh.
+
+    Raises
+    ------
+    InputError
+        If the mesh has another dimension, elements that are not known, numbers that are not finite, points on the wrong
+        side of an axis of revolution, or lacks a boundary that the part names.
+    """
     if not isinstance(mesh, skfem.Mesh) or mesh.p.shape[0] != scene.dim or mesh.refdom.__name__ not in SHAPES:
         raise InputError(
             f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension {scene.dim} made of "

@@ -17,9 +17,23 @@ Result = TypeVar("Result")
 def each(
     act: Callable[[Item], Result], items: Iterable[Item], parallel: Sequence[bool] | None = None
 ) -> tuple[Result, ...]:
-    """`act` on every item, in order; those marked `parallel` (by default all) at the same time, each in its own thread.
+    """Apply a function to every item, some of them at the same time.
 
     The threads end with the call. An exception of one item is raised here.
+
+    Parameters
+    ----------
+    act
+        The function of an item.
+    items
+        The items.
+    parallel
+        A mark for every item: those marked are worked on at the same time, each in its own thread. By default all are.
+
+    Returns
+    -------
+    tuple
+        What the function returned, in the order of the items.
     """
     listed = list(items)
     marked = [True] * len(listed) if parallel is None else list(parallel)

@@ -27,8 +27,9 @@ import scipy.sparse as sp
 
 from contactopt.bodies.body import Assembly, build_body, reload_body
 from contactopt.bodies.elements import face_nodes
-from contactopt.bodies.fields import Fields, fields_of, recovery_error
-from contactopt.bodies.protocol import Equilibrium, Mesh, Surface
+from contactopt.bodies.fields import Fields, fields_of, recovery_errors
+from contactopt.bodies.protocol import Equilibrium, Mesh, Region, Surface
+from contactopt.bodies.recovery import StressMap, stress_map
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.errors import InputError
@@ -121,6 +122,7 @@ class ElasticBody:
 
     def _low_rank(self, T: sp.csr_matrix) -> tuple[np.ndarray, np.ndarray]:
         """L, R (rows, j) with T C T' = T G T' + L R'."""
+        # C = G + E E' - Z Y' - Y Z' (contactopt.bodies.motions), seen through T.
         E, Z, Y = T @ self.elastic_modes, T @ self.body.rigid_motions.fields, T @ self.relief
         if not Z.shape[1]:
             return E, E  # one array, so that their product is symmetric to the last digit
@@ -139,6 +141,7 @@ class ElasticBody:
         return None
 
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
+        # T G T' from the block of G on the contact unknowns, and T C T' with what is of low rank; both made symmetric.
         local, (left, right) = T[:, self.interface], self._low_rank(T)
         C, added = local @ (local @ self.interface_compliance).T, left @ right.T
         return np.asarray((C + C.T) / 2 + (added + added.T) / 2)
@@ -172,10 +175,10 @@ class ElasticBody:
 
     def load_work(self, scene: Scene, part: Part, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
         old, new = self.body, reload_body(self.body, scene, part)
-        lift, plates = new.prescribed - old.prescribed, self.modes[0].shape[1]
+        prescribed, plates = new.prescribed - old.prescribed, self.modes[0].shape[1]
         driven = self.modes[1] @ (self.elastic_modes.T @ dual) + self.modes[0] @ weights[:plates]
-        loads = new.load - old.load - old.A @ lift
-        return float(dual @ lift + W @ loads + driven @ (new.plate_forces - old.plate_forces))
+        loads = new.load - old.load - old.A @ prescribed
+        return float(dual @ prescribed + W @ loads + driven @ (new.plate_forces - old.plate_forces))
 
     def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.body.A @ U, np.zeros(len(U))
@@ -206,8 +209,15 @@ class ElasticBody:
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
 
-    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
-        return recovery_error(self.body, U, W)
+    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+        return recovery_errors(self.body, U, *others)
+
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
+        dofs = self.body.basis.element_dofs
+        return np.asarray((values / np.maximum(np.bincount(dofs.ravel(), minlength=len(values)), 1))[dofs].sum(axis=0))
+
+    def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap:
+        return stress_map(self.body, region, by_poisson)
 
     def loaded(self, scene: Scene, part: Part) -> ElasticBody:
         return _at_rest(self, reload_body(self.body, scene, part))
@@ -299,7 +309,25 @@ def _trace(weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held
 
 
 def assemble_elastic(scene: Scene, part: Part, elements: int, zone: float | None) -> AssembledElastic:
-    """An elastic Part of a scene on its mesh for `elements` and `zone`."""
+    """Assemble an elastic part of a scene.
+
+    Parameters
+    ----------
+    scene, part
+        The scene and one of its parts.
+    elements, zone
+        Number of elements across the contact half-width, and the half-width that the mesh resolves [length].
+
+    Returns
+    -------
+    AssembledElastic
+        The body as matrices, whose linear system is not solved yet.
+
+    Raises
+    ------
+    InputError
+        For a part that cannot be modelled.
+    """
     return AssembledElastic(build_body(scene, part, elements, zone), part)
 
 
@@ -315,27 +343,39 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     entries
         Whether to eliminate the contact unknowns last, so that the factors hold their Schur complement: this makes the
         entries of the compliance cheap, and serves an explicit Q.
+
+    Returns
+    -------
+    ElasticBody
+        The body, which moves under contact forces.
     """
+    # The free unknowns without the fixing ones, with node and component of each, and those of the contact surfaces.
     dofs, n = body.unknowns, len(body.load)
     node, component, place = np.empty(n, int), np.empty(n, int), np.full(n, -1)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
     kept = np.setdiff1d(body.free, body.rigid_motions.fixing)
     place[kept] = np.arange(len(kept))
     interface = np.intersect1d(body.contact_dofs, kept)
+    # Factors of A on these unknowns, or multigrid, which needs no copy of A.
     iterative = solver_type(solver, len(kept), len(dofs)).iterative
     A = Block(body.A, kept) if iterative else body.A[kept][:, kept]
     trailing = place[interface] if entries else None
     made = make_solver(solver, System(A, node[kept], component[kept], body.locations, trailing))
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
+    # Y, with which the generalised inverse of a floating body is G - Z Y' - Y Z'.
     relief = _relief(body, made, kept)
     # A plate that alone holds a body along itself moves it as a rigid whole, for which there is nothing to solve.
     extended = _rigid_extension(body)
     lacking, forces = (np.abs((body.A @ motion)[kept]).max(axis=0, initial=0.0) for motion in (extended, body.motion))
     strained = lacking > RIGID * forces
+    # The extension of the other plate motions M into the body: Z = M - A_ff^-1 A_f: M.
     if strained.any():
         extended[np.ix_(kept, strained)] -= made.solve((body.A @ extended[:, strained])[kept])
+    # Rigid motions are multipliers of their own, so that plate motions have no part along them.
     if len(body.rigid_motions.names):
         extended -= body.rigid_motions.fields @ (body.rigid_motions.forces.T @ extended)
+    # The stiffness of the plates, Z' A Z. Its kernel moves freely; the rest are the elastic modes E = Z v /
+    # stiffness^1/2.
     K = extended.T @ (body.A @ extended)
     stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
     moves = stiffness <= KERNEL * np.max(np.sum(body.motion * (body.A @ body.motion), axis=0), initial=0.0)
@@ -373,8 +413,11 @@ def _rigid_extension(body: Assembly) -> np.ndarray:
 
 def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:
     """The body `old` under the loads of `body`."""
+    # With the prescribed displacements put in, loads act on the free unknowns and on the plates: p + Z' (f - A g).
     residual = body.load - body.A @ body.prescribed
     resisted = body.plate_forces + old.extended.T @ residual
+    # The displacement without contact forces: that of supports, of the resisted plate motions, and of the free
+    # unknowns.
     at_rest = body.prescribed + old.elastic_modes @ (old.modes[1].T @ resisted) + old.relieved(residual)
     resultants = np.concatenate([old.modes[0].T @ resisted, body.rigid_motions.fields.T @ body.load])
     return replace(old, body=body, at_rest=at_rest, resultants=resultants)

@@ -37,6 +37,17 @@ SHAPES = {
     "RefTet": (skfem.MeshTet, {1: skfem.ElementTetP1, 2: skfem.ElementTetP2}),
     "RefHex": (skfem.MeshHex, {1: skfem.ElementHex1, 2: skfem.ElementHex2}),
 }
+CURVED = {"RefTri": skfem.MeshTri2, "RefQuad": skfem.MeshQuad2, "RefTet": skfem.MeshTet2, "RefHex": skfem.MeshHex2}
+CELLS = {  # what meshio and VTK call the elements, by whether they are of second order
+    "RefTri": ("triangle", "triangle6"), "RefQuad": ("quad", "quad9"),
+    "RefTet": ("tetra", "tetra10"), "RefHex": ("hexahedron", "hexahedron27"),
+}  # fmt: skip
+# nodes of a hexahedron of scikit-fem in the order of VTK: corners, edges, faces, centre
+HEXAHEDRON = (
+    0, 3, 6, 2, 1, 5, 7, 4, 10, 16, 14, 9, 12, 18, 17, 11, 8, 15, 19, 13, 20, 25, 22, 23, 21, 24, 26,
+)  # fmt: skip
+# nodes of a simplex numbered the other way round
+TURNED = {"RefTri": (0, 2, 1, 5, 4, 3), "RefTet": (0, 2, 1, 3, 6, 5, 4, 7, 9, 8)}
 _LINE = RefLine, skfem.ElementLineP1(), np.array([[0.0, 1.0, 0.5]])
 _TRIANGLE = RefTri, skfem.ElementTriP1(), np.array([[0.0, 1.0, 0.0, 0.5, 0.5, 0.0], [0.0, 0.0, 1.0, 0.0, 0.5, 0.5]])
 _SQUARE = (
@@ -72,13 +83,43 @@ class Trace(NamedTuple):
 
 
 def weight_at(weight: tuple[float, bool], x: np.ndarray) -> np.ndarray | float:
-    """Measure of the integrals: a constant (thickness, copies), times r in an axisymmetric scene."""
+    """Compute the measure of the integrals at places: a constant (thickness, copies), times r in an axisymmetric scene.
+
+    Parameters
+    ----------
+    weight
+        The constant, and whether the scene is axisymmetric.
+    x
+        (dim, ...) places [length].
+
+    Returns
+    -------
+    ndarray or float
+        The measure (...) in an axisymmetric scene, else one number.
+    """
     factor, axisymmetric = weight
     return factor * x[0] if axisymmetric else factor
 
 
 def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellBasis:
-    """Vector-valued displacement; quadrature exact for the stiffness of straight-sided parallelepipeds but for 1/r."""
+    """Make the vector-valued displacement basis of a mesh.
+
+    Its quadrature is exact for the stiffness of straight-sided parallelepipeds but for the factor 1/r.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+    degree
+        Degree of the displacement, 1 or 2.
+    axisymmetric
+        Whether the integrals carry the weight r.
+
+    Returns
+    -------
+    CellBasis
+        The basis of N unknowns.
+    """
     element = SHAPES[mesh.refdom.__name__][1][degree]()
     simplex = mesh.refdom.__name__ in ("RefTri", "RefTet") and not is_curved(mesh)
     order = 2 if simplex and not axisymmetric else 2 * degree + axisymmetric
@@ -136,26 +177,129 @@ class _Shapes(Sequence[Any]):
 
 
 def is_curved(mesh: skfem.Mesh) -> bool:
-    """Whether the mesh has nodes of its own on edges, which may lie off the straight line."""
+    """Say whether a mesh has nodes of its own on edges, which may lie off the straight line.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+
+    Returns
+    -------
+    bool
+        False for meshes whose nodes are their vertices.
+    """
     return int(mesh.p.shape[1]) != int(mesh.nvertices)
 
 
 def straight(mesh: skfem.Mesh) -> skfem.Mesh:
-    """The mesh of the same vertices with straight edges; boundaries keep their names."""
+    """Make the mesh of the same vertices with straight edges. Boundaries keep their names.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+
+    Returns
+    -------
+    Mesh
+        The mesh itself if it is straight.
+    """
     if not is_curved(mesh):
         return mesh
-    plain = SHAPES[mesh.refdom.__name__][0](mesh.p[:, : mesh.nvertices], mesh.t)
+    plain = SHAPES[mesh.refdom.__name__][0](np.ascontiguousarray(mesh.p[:, : mesh.nvertices]), mesh.t)
     return plain.with_boundaries(mesh.boundaries) if mesh.boundaries else plain
 
 
+def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
+    """The mesh with the places (dim, n) of all nodes of a quadratic displacement, the vertices first; boundaries keep their names."""
+    if is_curved(mesh):
+        return mesh
+    made = CURVED[mesh.refdom.__name__](places, mesh.t)
+    return made.with_boundaries(mesh.boundaries) if mesh.boundaries else made
+
+
+def elements_of(mesh: skfem.Mesh) -> tuple[str, np.ndarray]:
+    """List the elements of a mesh with their nodes in the order of VTK.
+
+    scikit-fem sorts the corners of simplices; here they are numbered so that volumes are positive.
+
+    Parameters
+    ----------
+    mesh
+        A mesh of first or second order.
+
+    Returns
+    -------
+    tuple
+        The name of the elements, a value of CELLS, and their nodes (e, v).
+    """
+    nodes = np.array(mesh.dofs.element_dofs)
+    if mesh.refdom.__name__ == "RefHex":
+        nodes = nodes[list(HEXAHEDRON[: len(nodes)])]
+    elif mesh.refdom.__name__ in TURNED:
+        sides = mesh.p[:, nodes[1 : len(mesh.p) + 1]] - mesh.p[:, nodes[:1]]
+        negative = np.linalg.det(sides.transpose(2, 1, 0)) < 0
+        nodes[:, negative] = nodes[list(TURNED[mesh.refdom.__name__][: len(nodes)])][:, negative]
+    return CELLS[mesh.refdom.__name__][is_curved(mesh)], nodes.T
+
+
+def facet_nodes(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
+    """Find all nodes of a mesh on some of its facets, those in the middle of edges and faces included.
+
+    Parameters
+    ----------
+    mesh
+        A mesh of first or second order.
+    facets : (f,)
+        Indices of facets.
+
+    Returns
+    -------
+    (n,) array
+        Indices of nodes, without repetition.
+    """
+    if not is_curved(mesh):
+        return np.unique(mesh.facets[:, facets])
+    return np.unique(mesh.dofs.get_facet_dofs(facets).flatten())
+
+
 def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
-    """(dim, N / dim) unknowns of every node, one row per component; the vertices of the mesh come first."""
+    """Number the unknowns of every node.
+
+    Parameters
+    ----------
+    basis
+        A displacement basis of N unknowns.
+
+    Returns
+    -------
+    ndarray
+        (dim, N / dim) unknowns, one row for each component. The vertices of the mesh come first.
+    """
     kinds = (basis.nodal_dofs, basis.edge_dofs, basis.facet_dofs, basis.interior_dofs)
     return np.concatenate([np.asarray(dofs) for dofs in kinds if np.size(dofs)], axis=1)
 
 
 def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: tuple[float, bool]) -> Trace:
-    """The trace of the displacement on a boundary (f,) of mesh facets."""
+    """Make the trace of the displacement on a boundary, with contact nodes, nodal areas and normals.
+
+    Parameters
+    ----------
+    basis
+        The displacement basis of the body.
+    degree
+        Its degree, 1 or 2.
+    boundary
+        (f,) numbers of the facets of the mesh.
+    weight
+        The measure of the integrals, as for `weight_at`.
+
+    Returns
+    -------
+    Trace
+        The contact nodes with areas [length^2], unit normals, and the sparse matrix W of this module's head.
+    """
     name = basis.mesh.refdom.__name__
     shape, places, cells = SHAPES[name][1][degree](), FACES[name][2], FACES[name][3]
     if degree == 1:
@@ -192,7 +336,22 @@ def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, wei
 
 
 def face_nodes(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (face, j) of the faces of a boundary, corners first in cyclic order, and mean outward normals (dim, face)."""
+    """Find the nodes and the normals of the faces of a boundary.
+
+    Parameters
+    ----------
+    basis
+        The displacement basis of the body.
+    degree
+        Its degree, 1 or 2.
+    boundary
+        (f,) numbers of the facets of the mesh.
+
+    Returns
+    -------
+    tuple
+        Nodes (f, j) of each face, corners first in cyclic order, and mean outward normals (dim, f).
+    """
     name = basis.mesh.refdom.__name__
     shape, places = SHAPES[name][1][degree](), FACES[name][2]
     if degree == 1:

@@ -11,8 +11,9 @@ import numpy as np
 import skfem
 
 from contactopt.bodies.body import Assembly
-from contactopt.bodies.elements import SHAPES, straight, weight_at
+from contactopt.bodies.elements import SHAPES, elements_of, second_order, straight, weight_at
 from contactopt.material import lame
+from contactopt.vtu import write_vtu
 
 STRESSES = {
     "plane-strain": ("xx", "yy", "zz", "xy"),
@@ -20,12 +21,15 @@ STRESSES = {
     "solid": ("xx", "yy", "zz", "xy", "yz", "xz"),
 }
 PLACES = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
+BLOCK = 2000  # elements whose shape functions are evaluated at a time, which bounds the memory that they take
 
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """One body after the solve, at the n vertices of its mesh.
+    """One body after the solve, at the n nodes of its mesh, of which the vertices come first.
 
+    mesh         of scikit-fem, with the places of all nodes in `mesh.p`: of second order where the displacement is quadratic,
+                 with nodes in the middle of edges, quadrilaterals and hexahedra
     displacement (dim, n) [length];  stress (n, 4 or 6) [stress], components named in `names`;  von_mises (n,)
     contact      name -> (n,) or (n, 3) contact quantities at the nodes, if they were asked for
     """
@@ -39,77 +43,119 @@ class Fields:
     contact: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def write_vtu(self, path: Path) -> None:
-        """The body as a VTU file with displacement, stress, von Mises stress and contact quantities at the nodes."""
-        from skfem.io.meshio import to_meshio
+        """Write the body as a VTU file with displacement, stress, von Mises stress and contact quantities at the nodes.
 
+        Cells of second order are quadratic triangles and tetrahedra, biquadratic quadrilaterals and triquadratic hexahedra of VTK
+        (22, 24, 28 and 29).
+
+        Parameters
+        ----------
+        path
+            The file.
+        """
         flat = {f"stress_{name}": column for name, column in zip(self.names, self.stress.T)}
         vectors = np.pad(self.displacement, ((0, 3 - len(self.displacement)), (0, 0))).T
         data = {"displacement": vectors, "von_mises": self.von_mises, **flat, **self.contact}
-        mesh = to_meshio(self.mesh, point_data=data, encode_cell_data=False, encode_point_data=False)
-        mesh.points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
-        mesh.write(path, file_format="vtu")
+        write_vtu(path, self.mesh.p.T, *elements_of(self.mesh), data)
 
 
 def fields_of(body: Assembly, U: np.ndarray) -> Fields:
-    """Fields of a body at the displacement U (n,) of all its unknowns."""
+    """Compute the fields of a body at a displacement of all its unknowns.
+
+    Parameters
+    ----------
+    body
+        The assembled body of n unknowns.
+    U
+        (n,) displacement [length].
+
+    Returns
+    -------
+    Fields
+        Displacement, stress and von Mises stress at the vertices of the mesh.
+    """
     basis = body.basis
     stress = nodal_stress(body, U)
     full = np.stack([stress[i, j] for i, j in PLACES[len(body.unknowns)]], axis=1)
     mean = np.trace(stress) / 3
     deviator = stress - mean * np.eye(3)[:, :, None]
     von_mises = np.sqrt(1.5 * np.sum(deviator**2, axis=(0, 1)))
-    return Fields(body.name, straight(basis.mesh), STRESSES[body.kind], U[basis.nodal_dofs], full, von_mises)
+    mesh = straight(basis.mesh) if body.degree == 1 else second_order(basis.mesh, body.locations)
+    return Fields(body.name, mesh, STRESSES[body.kind], U[body.unknowns], full, von_mises)
 
 
-def nodal_stress(body: Assembly, U: np.ndarray) -> np.ndarray:
-    """Stress tensor (3, 3, n) at the vertices of the mesh, averaged over the elements with their volumes.
+def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.ndarray:
+    """Stress tensor (3, 3, n) at the nodes of a body, averaged over the elements with their volumes.
 
-    An element counts with its mean stress where the displacement is linear, with its stress at the vertex where it is
+    An element counts with its mean stress where the displacement is linear, with its stress at the node where it is
     quadratic. Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
+
+    everywhere  whether at all nodes of a quadratic displacement, or at the vertices of the mesh alone
     """
     basis, mesh = body.basis, body.basis.mesh
     volume = basis.dx.sum(axis=1)
+    shape = SHAPES[mesh.refdom.__name__][1][body.degree if everywhere else 1]()
     if body.degree == 1:
         element = np.sum(stress_in(body, basis, U) * basis.dx, axis=3) / volume
         values = np.repeat(element[..., None], len(mesh.t), axis=3)
     else:
-        corners = SHAPES[mesh.refdom.__name__][1][1].doflocs.T
-        places = skfem.Basis(mesh, basis.elem, quadrature=(corners, np.ones(corners.shape[1])))
-        values = stress_in(body, places, U)
-    vertices, count = mesh.t.T.ravel(), int(mesh.nvertices)
-    weight = np.bincount(vertices, np.repeat(volume, len(mesh.t)), count)
+        places = shape.doflocs.T
+        blocks = np.array_split(np.arange(mesh.nelements), -(-mesh.nelements // BLOCK))
+        rule = places, np.ones(places.shape[1])
+        bases = (skfem.Basis(mesh, basis.elem, elements=block, quadrature=rule) for block in blocks)
+        values = np.concatenate([stress_in(body, at, U) for at in bases], axis=2)
+    nodes = skfem.Dofs(mesh, shape).element_dofs  # numbered as the nodes are
+    where, count = nodes.T.ravel(), int(nodes.max()) + 1
+    weight = np.bincount(where, np.repeat(volume, len(nodes)), count)
     total = np.zeros((3, 3, count))
     for i in range(3):
         for j in range(3):
-            total[i, j] = np.bincount(vertices, (values[i, j] * volume[:, None]).ravel(), count)
+            total[i, j] = np.bincount(where, (values[i, j] * volume[:, None]).ravel(), count)
     return total / weight
 
 
-def recovery_error(body: Assembly, U: np.ndarray, W: np.ndarray) -> np.ndarray:
-    """For every element the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)) [force length], (elements,).
+def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Estimate for every element how much it adds to the error of the energy, or of other functionals.
 
-    s is the stress of a displacement and s* the continuous stress with its averages at the vertices, which is more
-    accurate where the solution is smooth. With W = U it is twice the energy of the estimated error in each element; with W
-    the displacement of an adjoint problem it is what the element adds to the error of that problem's functional.
+    For each other field W these are the integrals of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)).
+
+
+    For every element this is the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)). s is the stress of a displacement
+    and s* the continuous stress with its averages at the vertices, which is more accurate where the solution is smooth.
+    With W = U it is twice the energy of the estimated error in each element; with W the displacement of an adjoint
+    problem it is what the element adds to the error of that problem's functional.
 
     Source: Zienkiewicz, Zhu (1987), A simple error estimator and adaptive procedure for practical engineering analysis.
+
+    Parameters
+    ----------
+    body
+        The assembled body of n unknowns.
+    U, W
+        (n,) displacements [length].
+
+    Returns
+    -------
+    ndarray
+        (elements,) integrals [force length].
     """
     basis, mesh = body.basis, straight(body.basis.mesh)
-    shape = SHAPES[mesh.refdom.__name__][1][1]()
-    vertices = skfem.Basis(mesh, shape, quadrature=(basis.X, basis.W))
-    first, second = (
-        sum(
-            nodal_stress(body, field)[:, :, mesh.t[i]][..., None] * np.asarray(vertices.basis[i][0])
-            for i in range(len(mesh.t))
-        )
-        - stress_in(body, basis, field)
-        for field in (U, W)
-    )
+    vertices = skfem.Basis(mesh, SHAPES[mesh.refdom.__name__][1][1](), quadrature=(basis.X, basis.W))
+
+    def missing(field: np.ndarray) -> np.ndarray:
+        nodal = nodal_stress(body, field, everywhere=False)
+        smooth = sum(nodal[:, :, own][..., None] * np.asarray(shape[0]) for own, shape in zip(mesh.t, vertices.basis))
+        return np.asarray(smooth - stress_in(body, basis, field))
+
     E, nu = body.material.E, body.material.nu
-    traces = np.trace(first) * np.trace(second)
-    density = ((1 + nu) * np.sum(first * second, axis=(0, 1)) - nu * traces) / E
-    weight = weight_at(body.weight, np.asarray(basis.global_coordinates()))
-    return np.asarray(np.sum(density * basis.dx * weight, axis=1))
+    measure = basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates()))
+    first, found = missing(U), []
+    for W in others:
+        second = first if W is U else missing(W)
+        traces = np.trace(first) * np.trace(second)
+        density = ((1 + nu) * np.sum(first * second, axis=(0, 1)) - nu * traces) / E
+        found.append(np.asarray(np.sum(density * measure, axis=1)))
+    return tuple(found)
 
 
 def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:

@@ -223,8 +223,14 @@ class HalfSpaceBody:
     def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
         return float(force @ self.material_change(constant, U, force)[0]) / 2
 
-    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+        return (np.zeros(0),) * len(others)
+
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
         return np.zeros(0)
+
+    def stress_map(self, region: object, by_poisson: bool = False) -> None:
+        return None
 
     def energy(self, U: np.ndarray) -> float:
         force = U[self.unknowns : 2 * self.unknowns]
@@ -297,7 +303,26 @@ def _periodic(body: HalfSpaceBody) -> Kernel:
 
 
 def assemble_half_space(scene: Scene, part: HalfSpace, elements: int, zone: float | None) -> HalfSpaceBody:
-    """A HalfSpace of a scene on its grid for `elements` and `zone`; the upper body fills the upper half."""
+    """Make a half-space of a scene on its grid. The upper body fills the upper half.
+
+    Parameters
+    ----------
+    scene, part
+        The scene and one of its half-spaces.
+    elements, zone
+        Number of points across the contact half-width, and the half-width that the grid resolves [length], for grids
+        that depend on them.
+
+    Returns
+    -------
+    HalfSpaceBody
+        The half-space on its grid.
+
+    Raises
+    ------
+    InputError
+        In an axisymmetric scene and in one with mirror images.
+    """
     if scene.kind == "axisymmetric" or scene.copies > 1:
         raise InputError(
             f"half-space '{part.name}': scene '{scene.name}' must be 'plane-strain' or 'solid' with copies = 1, because the "

@@ -8,7 +8,8 @@ the surface that the mesh stands for.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import combinations
 from typing import Any
@@ -24,17 +25,30 @@ log = logging.getLogger(__name__)
 Curve = Callable[[np.ndarray], np.ndarray]
 NEAREST = 16  # old facets among which the one that holds a new facet is looked for
 FLAT = 0.1  # least share of its volume that an element keeps where its nodes move to a curved boundary
+ROUND = 1e-5  # distance of nodes from a circle, over its radius, within which they lie on it: files round their numbers
+BENT = 0.15  # sagitta of an edge over its length, beyond which the mesh is too coarse for its curve
 CORNER = np.deg2rad(30)  # turn of a polygon between two edges from which on it is a corner of the body
 
 
 def simplices(mesh: Any) -> Any:
-    """The mesh as straight triangles or tetrahedra; quadrilaterals and hexahedra are cut, curved edges become straight."""
+    """Cut a mesh into straight triangles or tetrahedra.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh. Its quadrilaterals and hexahedra are cut, its curved edges become straight.
+
+    Returns
+    -------
+    Mesh
+        The mesh of simplices, with the names of the boundaries.
+    """
     if is_curved(mesh):
         mesh = replace(straight(mesh), _boundaries=mesh.boundaries)
     if isinstance(mesh, skfem.MeshQuad):
-        return _named(mesh, replace(mesh.to_meshtri(), _boundaries=None))
+        return named_like(mesh, replace(mesh.to_meshtri(), _boundaries=None))
     if isinstance(mesh, skfem.MeshHex):
-        return _named(mesh, replace(mesh.to_meshtet(), _boundaries=None))
+        return named_like(mesh, replace(mesh.to_meshtet(), _boundaries=None))
     return mesh
 
 
@@ -52,7 +66,8 @@ def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Curve]) -> Any:
     A mesh of the same kind with the same named boundaries.
     """
     nameless = replace(mesh, _boundaries=None)  # scikit-fem would warn that it loses the names
-    fine = _named(mesh, nameless.refined(np.asarray(marked)))
+    with _no_word_of_copies():
+        fine = named_like(mesh, nameless.refined(np.asarray(marked)))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
     points = fine.p.copy()
     for name, curve in curves.items():
@@ -68,14 +83,76 @@ def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Curve]) -> Any:
     return replace(fine, doflocs=points)
 
 
+def bent(mesh: Any, curves: Mapping[str, Curve]) -> Any:
+    """Bend the edges of a plane mesh of straight triangles along its curved boundaries.
+
+    Elements and named boundaries keep their numbers. An edge that would leave its chord by more than BENT of its length stays
+    straight; so do solids, and meshes without a curved boundary.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+    curves
+        By the name of a boundary the curve that moves points (2, m) onto it [length].
+
+    Returns
+    -------
+    mesh
+        A mesh of second order, or the same mesh where nothing is bent.
+    """
+    known = {name: curve for name, curve in curves.items() if len(mesh.boundaries[name])}
+    if len(mesh.p) != 2 or not known:
+        return mesh
+    with _no_word_of_copies():
+        made = skfem.MeshTri2.from_mesh(mesh)
+    points = made.doflocs.copy()
+    for name, curve in known.items():
+        facets = mesh.boundaries[name]
+        middle = made.dofs.facet_dofs[0, facets]
+        start, end = mesh.p[:, mesh.facets[:, facets]].transpose(1, 0, 2)
+        new = curve((start + end) / 2)
+        near = np.linalg.norm(new - (start + end) / 2, axis=0) <= BENT * np.linalg.norm(end - start, axis=0)
+        points[:, middle[near]] = new[:, near]
+    return replace(made, doflocs=points, _boundaries=mesh.boundaries)
+
+
+@contextmanager
+def _no_word_of_copies() -> Iterator[None]:
+    """scikit-fem says of large arrays that it copies them; no user can do anything about it."""
+    skfem_log = logging.getLogger("skfem.mesh.mesh")
+
+    def filtered(record: logging.LogRecord) -> bool:
+        return "C_CONTIGUOUS" not in record.getMessage()
+
+    skfem_log.addFilter(filtered)
+    try:
+        yield
+    finally:
+        skfem_log.removeFilter(filtered)
+
+
 def _volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """(t,) signed volumes of simplices, times the factorial of the dimension."""
     edges = points[:, cells[1:]] - points[:, cells[:1]]
     return np.asarray(np.linalg.det(np.moveaxis(edges, 2, 0)))
 
 
-def _named(old: Any, new: Any) -> Any:
-    """`new` with the named boundaries of `old`, whose boundary facets hold those of `new`."""
+def named_like(old: Any, new: Any) -> Any:
+    """Give a mesh the named boundaries of another one, whose boundary facets hold its own.
+
+    Parameters
+    ----------
+    old
+        A scikit-fem mesh with named boundaries.
+    new
+        A mesh of simplices of the same body, or of a part of it.
+
+    Returns
+    -------
+    mesh
+        `new` with the boundaries of `old`.
+    """
     if not old.boundaries:
         return new
     dim, facets, outer = len(old.p), old.boundary_facets(), new.boundary_facets()
@@ -101,10 +178,27 @@ def _outside(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.asarray(beyond + height / np.sqrt(np.trace(gram, axis1=2, axis2=3)))
 
 
-def boundary_curve(mesh: Any, name: str) -> Curve | None:
-    """The smooth line through the nodes of a plane boundary, by arc length; None in space and for straight boundaries.
+def boundary_curve(mesh: Any, name: str, arcs: bool = False) -> Curve | None:
+    """Lay a smooth line through the nodes of a plane boundary, by arc length.
 
-    Where the boundary turns by more than CORNER it has a corner, and the pieces between corners are smooth by themselves.
+    Where the boundary turns by more than CORNER it has a corner, and the pieces between corners are smooth by
+    themselves. A piece whose nodes lie on a circle is an arc of that circle.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+    name
+        One of its boundaries.
+    arcs
+        Whether every piece has to be an arc or straight. Otherwise the boundary is taken for the polygon that it is.
+
+    Returns
+    -------
+    callable or None
+        A function that moves points (2, m) to their places on the line (2, m) [length]. None in space, for straight
+        boundaries, and with `arcs` for a polygon.
+
     """
     if mesh.p.shape[0] != 2:
         return None
@@ -114,7 +208,7 @@ def boundary_curve(mesh: Any, name: str) -> Curve | None:
         points, middle = mesh.doflocs, mesh.dofs.facet_dofs[0, facets]
         edges = np.concatenate([[edges[0], middle], [middle, edges[1]]], axis=1)
     pieces = [_Piece(points[:, chain]) for chain in _chains(edges, points)]
-    if all(piece.flat for piece in pieces):
+    if all(piece.flat for piece in pieces) or (arcs and not all(piece.flat or piece.circle for piece in pieces)):
         return None
 
     def curve(points: np.ndarray) -> np.ndarray:
@@ -135,6 +229,7 @@ class _Piece:
         self.flat = nodes.shape[1] < 3 or bool(np.all(np.abs(turns) < 1e-9))
         closed = nodes.shape[1] > 3 and np.array_equal(nodes[:, 0], nodes[:, -1])
         self.line = CubicSpline(self.arc, nodes.T, bc_type="periodic" if closed else "not-a-knot")
+        self.circle = None if self.flat else _circle(nodes)
 
     def place(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The places (2, k) on the line for points near it, and how far (k,) these are from the polygon."""
@@ -144,8 +239,25 @@ class _Piece:
         distance = np.linalg.norm(offset - share * edge[:, None], axis=0)
         best = np.argmin(distance, axis=1)
         rows = np.arange(points.shape[1])
+        if self.circle is not None:
+            centre, radius = self.circle
+            away = points - centre[:, None]
+            return centre[:, None] + radius * away / np.linalg.norm(away, axis=0), distance[rows, best]
         at = self.arc[best] + share[rows, best] * np.diff(self.arc)[best]
         return np.asarray(self.line(at)).T, distance[rows, best]
+
+
+def _circle(nodes: np.ndarray) -> tuple[np.ndarray, float] | None:
+    """Centre and radius of the circle on which at least four nodes (2, m) lie; None where they do not."""
+    if nodes.shape[1] < 4:
+        return None
+    middle = nodes.mean(axis=1)
+    offset = nodes - middle[:, None]
+    terms = np.column_stack([2 * offset.T, np.ones(nodes.shape[1])])
+    x, y, rest = np.linalg.lstsq(terms, np.sum(offset**2, axis=0), rcond=None)[0]
+    radius = float(np.sqrt(max(rest + x**2 + y**2, 0.0)))
+    off = np.abs(np.hypot(offset[0] - x, offset[1] - y) - radius)
+    return (middle + np.array([x, y]), radius) if np.all(off < ROUND * radius) else None
 
 
 def _chains(edges: np.ndarray, points: np.ndarray) -> list[np.ndarray]:

@@ -50,7 +50,7 @@ class Motions:
     forces: np.ndarray
 
 
-def rigid_motions(kind: str, components: tuple[str, ...], x: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+def _rigid_motions(kind: str, components: tuple[str, ...], x: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
     """All rigid motions of points x (dim, k) as displacements (dim, k, m), and their names.
 
     Translations have length one; rotations are about the middle of the points and move the furthest of them by one. In
@@ -84,21 +84,27 @@ def free_motions(
     held: np.ndarray,
     weight: tuple[float, bool],
 ) -> Motions:
-    """The rigid motions of a body that leave all held unknowns at rest.
+    """Find the rigid motions of a body that leave all held unknowns at rest.
 
     Parameters
     ----------
     kind, components
         Of the scene.
     basis, weight
-        Displacement basis, and the measure of its integrals (contactopt.bodies.elements.weight_at).
+        Displacement basis of n unknowns, and the measure of its integrals (contactopt.bodies.elements.weight_at).
     unknowns
         (dim, nodes) displacement unknowns of every node.
     held
         (n,) mask of the unknowns that supports or plates prescribe.
+
+    Returns
+    -------
+    Motions
+        The motions Z (n, m) with their names, fixing unknowns (m,) and inertia forces S (n, m), as in this module's
+        head.
     """
     x = basis.doflocs[:, unknowns[0]]
-    rigid, labels = rigid_motions(kind, components, x)
+    rigid, labels = _rigid_motions(kind, components, x)
     R = np.zeros((basis.N, len(labels)))
     for mode, column in zip(np.moveaxis(rigid, 2, 0), R.T):
         column[unknowns] = mode
@@ -149,7 +155,22 @@ def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: tuple[float, boo
 
 
 def check_free(name: str, A: sp.csr_matrix, motions: Motions) -> None:
-    """The stiffness must not resist the free motions: InputError where rounding of extreme coordinates makes it do so."""
+    """Check that the stiffness of a body does not resist its free motions.
+
+    Parameters
+    ----------
+    name
+        The body, for the message.
+    A
+        (n, n) its stiffness [force / length].
+    motions
+        Its free motions.
+
+    Raises
+    ------
+    InputError
+        Where it does, because of the rounding of extreme coordinates.
+    """
     if not len(motions.names):
         return
     error = np.abs(A @ motions.fields).max(axis=0) / (np.abs(A.diagonal()).max() * np.abs(motions.fields).max(axis=0))

@@ -26,6 +26,7 @@ from contactopt.problem.coupled import BodyTerm, LocalTerm
 
 if TYPE_CHECKING:
     from contactopt.bodies.fields import Fields
+    from contactopt.bodies.recovery import StressMap
     from contactopt.problem.chart import Chart
     from contactopt.problem.convolution import Kernel
     from contactopt.problem.operators import Product
@@ -79,6 +80,18 @@ class Equilibrium:
         """The part of T C T' for a map T (rows, n) of the contact unknowns, before condensation."""
         left, right = self.low_rank
         return LocalTerm(T[:, self.free], self.stiffness, self.cycle, self.diagonal, (T @ left, T @ right))
+
+
+@dataclass(frozen=True)
+class Region:
+    """Where in a body: on a named boundary, at a point, in the circle or ball around a point, or everywhere.
+
+    boundary  its name;   point  coordinates [length];   radius  around the point [length]
+    """
+
+    boundary: str = ""
+    point: tuple[float, ...] = ()
+    radius: float | None = None
 
 
 class Equilibrated(Protocol):
@@ -144,20 +157,70 @@ class AssembledBody(Protocol):
     def meshed(self) -> bool: ...
 
     def surface(self, name: str | None = None) -> Surface:
-        """The contact surface of that name, by default the one that its part of the scene names."""
+        """Find a contact surface of the body.
+
+        Parameters
+        ----------
+        name
+            The name of a boundary; by default the one that its part of the scene names.
+
+        Returns
+        -------
+        Surface
+            The surface with its contacts.
+
+        Raises
+        ------
+        InputError
+            If there is no such surface.
+        """
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
-        """The surface of a body without a mesh at the contacts of another body, and the initial gap (k,) there [length].
+        """Make the surface of a body without a mesh at the contacts of another body.
 
-        `normals` (dim, k) are the contact normals that the other body suggests. The surface returned holds the contact
-        normals to be used, which may be the body's own.
+        Parameters
+        ----------
+        other
+            The surface of the other body, with k contacts.
+        normals
+            (dim, k) contact normals that the other body suggests.
+
+        Returns
+        -------
+        tuple
+            The surface, which holds the contact normals to be used (they may be the body's own), and the initial gap
+            (k,) [length].
         """
 
     def iterates(self, solver: str) -> bool:
-        """Whether that solver of linear systems, a name or 'auto', works by iteration on this body."""
+        """Say whether a solver of linear systems works by iteration on this body.
+
+        Parameters
+        ----------
+        solver
+            A name in contactopt.bodies.solvers.SOLVERS, or 'auto'.
+
+        Returns
+        -------
+        bool
+            True for multigrid, False for factors.
+        """
 
     def prepare(self, solver: str, entries: bool) -> Body:
-        """The body with its linear system made solvable; `entries` makes the entries of its compliance cheap."""
+        """Make the linear system of the body solvable.
+
+        Parameters
+        ----------
+        solver
+            A name in contactopt.bodies.solvers.SOLVERS, or 'auto'.
+        entries
+            Whether the entries of the compliance shall be cheap.
+
+        Returns
+        -------
+        Body
+            The body, which moves under contact forces.
+        """
 
 
 class Body(Protocol):
@@ -205,64 +268,295 @@ class Body(Protocol):
         """Its linear system where it is solved by iteration; None where products are direct."""
 
     def product(self, T: sp.csr_matrix) -> Product:
-        """Products with T C T', for a sparse map T (rows, n) of the contact unknowns; what they need is prepared once."""
+        """Prepare products with T C T', the compliance seen through a map.
+
+        Parameters
+        ----------
+        T
+            (rows, n) sparse map of the contact unknowns.
+
+        Returns
+        -------
+        callable
+            A function of X (rows, j) [force] and a relative accuracy, or None for the best there is, to the product
+            (rows, j) [length].
+        """
 
     def convolution(self, T: sp.csr_matrix) -> Kernel | None:
-        """T C T' as a convolution over a grid of the contacts, if it is one; None if not."""
+        """Write T C T' as a convolution over a grid of the contacts.
+
+        Parameters
+        ----------
+        T
+            (rows, n) sparse map of the contact unknowns.
+
+        Returns
+        -------
+        Kernel or None
+            The kernel; None if it is no convolution.
+        """
 
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
-        """T C T' (rows, rows) as an array, symmetric to the last digit [length / force]."""
+        """Compute T C T' as an array.
+
+        Parameters
+        ----------
+        T
+            (rows, n) sparse map of the contact unknowns.
+
+        Returns
+        -------
+        ndarray
+            (rows, rows), symmetric to the last digit [length / force].
+        """
 
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
-        """Mask (rows,) of the rows of T C T' that are not zero: what the body's compliance moves."""
+        """Tell which rows of T C T' are not zero: what the body's compliance moves.
+
+        Parameters
+        ----------
+        T
+            (rows, n) sparse map of the contact unknowns.
+
+        Returns
+        -------
+        ndarray
+            (rows,) mask.
+        """
 
     def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> np.ndarray:
-        """U (n,) under contact forces (n,) and multipliers (p,).
+        """Compute the displacement of the body under contact forces.
 
-        `free` are the unknowns of `equilibrium` under these forces, where they are known; they are not solved for again then.
+        Parameters
+        ----------
+        force
+            (n,) contact forces on its unknowns [force].
+        multipliers
+            (p,) displacements along its free motions.
+        free
+            The unknowns of `equilibrium` under these forces, where they are known; they are not solved for again then.
+
+        Returns
+        -------
+        ndarray
+            U (n,) [length].
         """
 
     def material_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of U (n,) and of the balance of the free motions (p,) by the material's constant 'E' or 'nu'.
+        """Differentiate the displacement and the balance by a constant of the material, at fixed forces and
+        multipliers.
 
-        The contact forces `force` (n,) and the multipliers stay as they are.
+        Parameters
+        ----------
+        constant
+            'E' or 'nu'.
+        U
+            (n,) displacement of the body [length].
+        force
+            (n,) contact forces on it [force].
+
+        Returns
+        -------
+        tuple
+            The derivatives of U (n,), and those of the balance of the free motions (p,).
         """
 
     def material_work(self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray) -> float:
-        """The product of `material_change` with `dual` (n,) and with the weights of the balance, without a solve.
+        """Multiply `material_change` with weights, without a solve.
 
-        W (n,) is the displacement under the forces `dual` and these weights as multipliers, without loads.
+        Parameters
+        ----------
+        constant
+            'E' or 'nu'.
+        U
+            (n,) displacement of the body [length].
+        force
+            (n,) contact forces on it [force].
+        dual
+            (n,) weights of the displacement.
+        W
+            (n,) displacement under the forces `dual` and the weights of the balance as multipliers, without loads.
+
+        Returns
+        -------
+        float
+            The product of both derivatives with their weights.
         """
 
     def load_work(self, scene: Any, part: Any, dual: np.ndarray, weights: np.ndarray, W: np.ndarray) -> float:
-        """The product of dual (n,) and weights (p,) with what the loads of `part` change in at_rest and resultants, without a solve.
+        """Multiply what other loads change in at_rest and resultants with weights, without a solve.
 
-        W as in `material_work`.
+        Parameters
+        ----------
+        scene, part
+            The scene with the other loads, and the part of it that stands for this body.
+        dual
+            (n,) weights of the displacement.
+        weights
+            (p,) weights of the resultants.
+        W
+            (n,) displacement as for `material_work`.
+
+        Returns
+        -------
+        float
+            The product of both changes with their weights.
         """
 
     def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of the elastic energy by U (n,) and, as far as it is no function of U, by the forces (n,)."""
+        """Differentiate the elastic energy.
 
-    def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
-        """Derivative of the elastic energy by the material's constant 'E' or 'nu' at fixed U and forces."""
+        Parameters
+        ----------
+        U
+            (n,) displacement of the body [length].
+        force
+            (n,) contact forces on it [force].
 
-    def energy(self, U: np.ndarray) -> float:
-        """Elastic energy at the displacement U (n,) [force length]."""
-
-    def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """Forces (n,) of loads, supports and plates on the body in equilibrium at the displacement U (n,)."""
-
-    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """For each support and plate its positions (dim, m) and the forces (dim, m) with which it acts on the body there.
-
-        U (n,) is the displacement under the contact forces `force` (n,).
+        Returns
+        -------
+        tuple
+            The derivatives (n,) by U and, as far as the energy is no function of U, those (n,) by the forces.
         """
 
-    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
-        """For each element the product of the stress errors of U and W (contactopt.bodies.fields); (0,) without elements."""
+    def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
+        """Differentiate the elastic energy by a constant of the material, at fixed U and forces.
+
+        Parameters
+        ----------
+        constant
+            'E' or 'nu'.
+        U
+            (n,) displacement of the body [length].
+        force
+            (n,) contact forces on it [force].
+
+        Returns
+        -------
+        float
+            The derivative.
+        """
+
+    def energy(self, U: np.ndarray) -> float:
+        """Compute the elastic energy at a displacement.
+
+        Parameters
+        ----------
+        U
+            (n,) displacement of the body [length].
+
+        Returns
+        -------
+        float
+            The energy [force length].
+        """
+
+    def external_forces(self, U: np.ndarray) -> np.ndarray:
+        """Compute the forces of loads, supports and plates on the body in equilibrium at a displacement.
+
+        Parameters
+        ----------
+        U
+            (n,) displacement of the body [length].
+
+        Returns
+        -------
+        ndarray
+            (n,) forces [force].
+        """
+
+    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Compute with which forces each support and each plate acts on the body.
+
+        Parameters
+        ----------
+        U
+            (n,) displacement under the contact forces [length].
+        force
+            (n,) these contact forces [force].
+
+        Returns
+        -------
+        dict
+            For the name of each support and plate its positions (dim, m) [length] and the forces (dim, m) there
+            [force].
+        """
+
+    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Compute for each element the products of the stress errors of displacements (contactopt.bodies.fields).
+
+        Parameters
+        ----------
+        U
+            (n,) displacements of the body [length].
+        *others
+            Further displacements (n,).
+
+        Returns
+        -------
+        tuple of ndarray
+            For each of the others its (elements,) products with U [force length]; (0,) for a body without elements.
+        """
+
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
+        """Deal values of the displacement unknowns out evenly to the elements that have each.
+
+        Parameters
+        ----------
+        values
+            (n,) one number for each displacement of the body.
+
+        Returns
+        -------
+        ndarray
+            (elements,); (0,) for a body without elements.
+        """
+
+    def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap | None:
+        """Make the recovered stress in a region a linear map of the displacements (contactopt.bodies.recovery).
+
+        Parameters
+        ----------
+        region
+            Where the stress is asked for.
+        by_poisson
+            Whether the derivative of the map by Poisson's ratio is wanted instead.
+
+        Returns
+        -------
+        StressMap or None
+            None where the stress cannot be read.
+        """
 
     def fields(self, U: np.ndarray) -> Fields | None:
-        """Displacement and stress at the displacement U (n,); None for a body without any."""
+        """Compute displacement and stress inside the body.
+
+        Parameters
+        ----------
+        U
+            (n,) displacement of the body [length].
+
+        Returns
+        -------
+        Fields or None
+            The fields; None for a body without any.
+        """
 
     def loaded(self, scene: Any, part: Any) -> Body:
-        """The same body under the loads of `part` in another scene; InputError if more than load values differ."""
+        """Put the loads of another scene on the body.
+
+        Parameters
+        ----------
+        scene, part
+            The other scene, and its part that stands for this body.
+
+        Returns
+        -------
+        Body
+            The same body under these loads.
+
+        Raises
+        ------
+        InputError
+            If more than load values differ.
+        """

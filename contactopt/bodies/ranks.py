@@ -94,11 +94,35 @@ class Team:
         return int(self.comm.size)
 
     def ask(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What the function returns on that rank; an exception that it raises is raised here."""
+        """Let a rank call a function, and wait for what it returns.
+
+        Parameters
+        ----------
+        rank
+            The number of the rank.
+        function, arguments
+            What it calls, and with which arguments. Both travel as bytes.
+
+        Returns
+        -------
+        object
+            What the function returned. An exception that it raised is raised here.
+        """
         return self.start(rank, function, *arguments)()
 
     def start(self, rank: int, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
-        """The same in two steps: the work begins now, and the function returned waits for its end."""
+        """Let a rank begin to call a function.
+
+        Parameters
+        ----------
+        rank, function, arguments
+            As for `ask`.
+
+        Returns
+        -------
+        callable
+            A function without arguments that waits for the end and returns what the function returned.
+        """
         tag = FIRST + self._next_number() % TICKETS
         self._order(rank, (tag, function, arguments))
 
@@ -163,7 +187,20 @@ class RemotePart(Part):
 
 
 def spread(scene: Scene, team: Team) -> Scene:
-    """The scene with its elastic bodies dealt out to the ranks in turn, from rank 0 on. All others stay on rank 0."""
+    """Deal out the elastic bodies of a scene to the ranks in turn, from rank 0 on. All other bodies stay on rank 0.
+
+    Parameters
+    ----------
+    scene
+        The scene, which stays as it is.
+    team
+        The ranks.
+
+    Returns
+    -------
+    Scene
+        The scene with RemotePart in place of the bodies on other ranks.
+    """
     elastic = [part.name for part in scene.parts if isinstance(part, Part)]
 
     def placed(part: Any) -> Any:
@@ -174,12 +211,18 @@ def spread(scene: Scene, team: Team) -> Scene:
 
 
 def values_of(part: Part) -> dict[str, Any]:
-    """The arguments that make a part."""
+    """Collect the arguments that make a part: the values of its fields by their names."""
     return {item.name: getattr(part, item.name) for item in fields(Part)}
 
 
 def serve(comm: Any) -> None:
-    """Do what rank 0 orders until it dismisses this rank."""
+    """Do what rank 0 orders until it dismisses this rank.
+
+    Parameters
+    ----------
+    comm
+        The communicator of mpi4py.
+    """
     kept: dict[int, Any] = {}
     lock = threading.Lock()
     while True:
@@ -217,7 +260,9 @@ def _portable(error: Exception) -> Exception:
 
 
 def shipped(message: Any) -> bytes:
-    """Anything as bytes; functions that have no name, such as those that make the meshes of scenes, travel by their code."""
+    """Pack anything as bytes. Functions without a name, such as those that make the meshes of scenes, travel by their
+    code.
+    """
     import cloudpickle
 
     return bytes(cloudpickle.dumps(message))
@@ -263,9 +308,17 @@ def _byte() -> Any:
 
 
 def world() -> Any:
-    """The communicator of all processes that mpiexec started with this one, None if it started no others.
+    """Find the communicator of all processes that mpiexec started with this one.
 
-    Raises InputError if the packages of the extra `mpi` are missing.
+    Returns
+    -------
+    Comm or None
+        The communicator of mpi4py; None if no others were started.
+
+    Raises
+    ------
+    InputError
+        If the packages of the extra `mpi` are missing.
     """
     if not any(os.environ.get(name, "1") != "1" for name in STARTED):
         return None
@@ -281,7 +334,7 @@ def world() -> Any:
 def launch(ranks: int, arguments: Sequence[str]) -> int:
     """Start the command line on several ranks of this machine, each bound to a core while there are enough of them.
 
-    Every rank uses one BLAS thread unless the environment says otherwise. Returns the exit code of rank 0.
+    Every rank uses one BLAS thread unless the environment says otherwise.
 
     Parameters
     ----------
@@ -289,6 +342,11 @@ def launch(ranks: int, arguments: Sequence[str]) -> int:
         How many processes.
     arguments
         Of the command line, without the name of the program.
+
+    Returns
+    -------
+    int
+        The exit code of rank 0.
 
     Raises
     ------
@@ -326,7 +384,18 @@ def ended_early(code: int) -> int:
 
 
 def leave(code: int) -> int:
-    """The exit code for mpiexec: 0 where `launch` waits for the true one, because mpiexec explains every other at length."""
+    """Choose the exit code for mpiexec, which explains every code but 0 at length.
+
+    Parameters
+    ----------
+    code
+        The true exit code of this rank.
+
+    Returns
+    -------
+    int
+        0 where `launch` waits for the true code in a file, else the code itself.
+    """
     if OUTCOME not in os.environ:
         return code
     Path(os.environ[OUTCOME]).write_text(str(code))

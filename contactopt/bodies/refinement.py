@@ -13,10 +13,27 @@ from contactopt.scenes.scene import Part, Scene
 
 
 def split(mesh: Any, *contacts: str) -> Any:
-    """The plane mesh with all elements halved, new nodes of curved contact boundaries on cubic splines.
+    """Halve all elements of a plane mesh, with new nodes of curved contact boundaries on cubic splines.
 
     The spline gives the height over the coordinate along which the boundary extends most, so that partners on
-    two bodies stay partners. Raises InputError for meshes of solids (scikit-fem drops their boundaries) or of curved elements.
+    two bodies stay partners.
+
+    Parameters
+    ----------
+    mesh
+        A plane scikit-fem mesh with straight elements.
+    contacts
+        Names of its contact boundaries.
+
+    Returns
+    -------
+    Mesh
+        The mesh of half the element size, with the same boundaries.
+
+    Raises
+    ------
+    InputError
+        For meshes of solids (scikit-fem drops their boundaries) and of curved elements.
     """
     from scipy.interpolate import CubicSpline
 
@@ -36,7 +53,22 @@ def split(mesh: Any, *contacts: str) -> Any:
 
 
 def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
-    """The scene on the meshes made for `elements` and then halved `splits` times."""
+    """Put a scene on the meshes made for `elements` and then halved several times.
+
+    Parameters
+    ----------
+    scene
+        The scene, which stays as it is.
+    elements
+        Number across the contact half-width, for which the meshes are made.
+    splits
+        How often they are halved.
+
+    Returns
+    -------
+    Scene
+        The scene with these meshes, whatever number of elements it is asked for.
+    """
 
     def finer(part: Any) -> Any:
         if not isinstance(part, Part):

@@ -364,6 +364,9 @@ class RemoteBody:
         found: dict[str, tuple[np.ndarray, np.ndarray]] = self._ask(_held_by, U.kept, force)
         return found
 
+    def stress_map(self, region: object, by_poisson: bool = False) -> None:
+        return None
+
     def fields(self, U: Any) -> Fields:
         found: Fields = self._ask(_fields, U.kept)
         return found
@@ -416,7 +419,20 @@ class AssembledRemote:
 
 
 def assemble_remote(scene: Scene, part: RemotePart, elements: int, zone: float | None) -> AssembledRemote:
-    """A RemotePart of a scene, assembled on its rank."""
+    """Assemble a body on its rank.
+
+    Parameters
+    ----------
+    scene, part
+        The scene and one of its remote parts.
+    elements, zone
+        Number of elements across the contact half-width, and the half-width that the mesh resolves [length].
+
+    Returns
+    -------
+    AssembledRemote
+        What stands for the body on this rank.
+    """
     team = part.team
     assert team is not None
     kept = team.keep(part.rank, _assembled, _sent(scene, part), elements, zone)

@@ -133,8 +133,14 @@ class RigidBody:
     def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
         return 0.0
 
-    def recovery_error(self, U: np.ndarray, W: np.ndarray) -> np.ndarray:
+    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
+        return (np.zeros(0),) * len(others)
+
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
         return np.zeros(0)
+
+    def stress_map(self, region: object, by_poisson: bool = False) -> None:
+        return None
 
     def energy(self, U: np.ndarray) -> float:
         return 0.0
@@ -157,5 +163,18 @@ class RigidBody:
 
 
 def assemble_rigid(scene: Scene, part: Rigid, elements: int, zone: float | None) -> RigidBody:
-    """A Rigid part of a scene. `elements` and `zone` say nothing about it."""
+    """Make a rigid body of a scene.
+
+    Parameters
+    ----------
+    scene, part
+        The scene and one of its rigid parts.
+    elements, zone
+        Not used: a rigid body has no mesh.
+
+    Returns
+    -------
+    RigidBody
+        The body, whose unknowns are its motions.
+    """
     return RigidBody(part, scene.components)

@@ -15,7 +15,22 @@ PIECE = 2**20  # entries of element matrices that are held at the same time
 
 
 def stiffness(basis: skfem.CellBasis, material: Material, weight: tuple[float, bool]) -> sp.csr_matrix:
-    """Elastic stiffness of a material, as isotropic_stiffness() of its Lame parameters."""
+    """Assemble the elastic stiffness of a material.
+
+    Parameters
+    ----------
+    basis
+        The displacement basis of N unknowns.
+    material
+        Young's modulus and Poisson's ratio.
+    weight
+        The measure of the integrals, as for contactopt.bodies.elements.weight_at.
+
+    Returns
+    -------
+    csr_matrix
+        (N, N) stiffness [force / length].
+    """
     return isotropic_stiffness(basis, lame(material), weight)
 
 

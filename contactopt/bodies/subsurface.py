@@ -23,20 +23,22 @@ PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2)
 
 
 def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]) -> np.ndarray:
-    """Stress tensors below the points of a half-space.
+    """Compute the stress tensors below the points of a half-space.
 
     Parameters
     ----------
     body
         The half-space; not a periodic one.
     force
-        Forces (k, dim) on its points in its components [force].
+        (k, dim) forces on its points in its components [force].
     depths
-        Depths (j,) below the surface [length], at least half a spacing.
+        (j,) depths below the surface [length], at least half a spacing.
 
     Returns
     -------
-    (j, *grid, 3, 3) stresses in the axes of the scene [stress]; in plane strain the third axis is that across the plane.
+    ndarray
+        (j, n0[, n1], 3, 3) stresses in the axes of the scene, for the (n0[, n1]) points of the grid [stress]. In plane
+        strain the third axis is that across the plane.
 
     Raises
     ------
@@ -67,7 +69,18 @@ def stress_below(body: HalfSpaceBody, force: np.ndarray, depths: Sequence[float]
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
-    """Von Mises stress (...,) of stress tensors (..., 3, 3)."""
+    """Compute von Mises stresses.
+
+    Parameters
+    ----------
+    stress
+        (..., 3, 3) stress tensors [stress].
+
+    Returns
+    -------
+    ndarray
+        (...) von Mises stresses [stress].
+    """
     deviator = stress - np.trace(stress, axis1=-2, axis2=-1)[..., None, None] / 3 * np.eye(3)
     return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=(-2, -1))))
 
@@ -101,9 +114,21 @@ def _mean(body: HalfSpaceBody, offsets: list[np.ndarray], depth: float, points: 
 
 
 def flamant(x: np.ndarray, z: float) -> np.ndarray:
-    """Stresses (xx, zz, xz) under unit line forces along x and into the body, z the depth: shape (3, 2, *x.shape).
+    """Compute the stresses under unit line forces along x and into the body.
 
     Source: Johnson (1985), sections 2.2 and 2.3.
+
+    Parameters
+    ----------
+    x
+        Places of any shape along the surface, from the force [length].
+    z
+        The depth [length].
+
+    Returns
+    -------
+    ndarray
+        (3, 2, ...): the stresses xx, zz and xz under each of the two forces, at the places [1 / length].
     """
     square = x**2 + z**2
     radial = [-2 / np.pi * x / square**2, -2 / np.pi * z / square**2]
@@ -111,9 +136,24 @@ def flamant(x: np.ndarray, z: float) -> np.ndarray:
 
 
 def boussinesq_cerruti(x: np.ndarray, y: np.ndarray, z: float, nu: float) -> np.ndarray:
-    """Stresses (xx, yy, zz, xy, xz, yz) under unit point forces along x, y and into the body: shape (6, 3, *shape).
+    """Compute the stresses under unit point forces along x, y and into the body.
 
-    z > 0 is the depth. Sources: Johnson (1985), sections 3.2 and 3.6.
+    Sources: Johnson (1985), sections 3.2 and 3.6.
+
+    Parameters
+    ----------
+    x, y
+        Places along the surface, from the force, of shapes that fit each other [length].
+    z
+        The depth, greater than 0 [length].
+    nu
+        Poisson's ratio.
+
+    Returns
+    -------
+    ndarray
+        (6, 3, ...): the stresses xx, yy, zz, xy, xz and yz under each of the three forces, at the places [1 /
+        length^2].
     """
     x, y = np.broadcast_arrays(x, y)
     rho = np.sqrt(x**2 + y**2 + z**2)

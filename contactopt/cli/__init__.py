@@ -20,7 +20,19 @@ __all__ = ["main", "make_parser"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point; returns the exit code: 0 solved, 1 not solved, 2 bad input."""
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments
+        The arguments after the name of the program; by default those of the process.
+
+    Returns
+    -------
+    int
+        The exit code: 0 done (run: solved, and to the accuracy asked for), 1 not solved, 2 input that cannot be used,
+        130 interrupted.
+    """
     told = sys.argv[1:] if arguments is None else list(arguments)
     options = make_parser().parse_args(told, argparse.Namespace(team=None, ranks=None))
     with _logging(options.verbose, options.quiet):

@@ -18,7 +18,7 @@ FORCES = {("mm", "MPa"): "N", ("m", "Pa"): "N", ("m", "kPa"): "kN", ("m", "MPa")
 Command = Callable[[argparse.Namespace], int]
 
 
-def arguments_of(texts: list[str]) -> dict[str, Any]:
+def _arguments_of(texts: list[str]) -> dict[str, Any]:
     """The values of NAME=VALUE texts. A value is a number, true, false or a list as in TOML; anything else is a text."""
     found: dict[str, Any] = {}
     for text in texts:
@@ -34,12 +34,29 @@ def arguments_of(texts: list[str]) -> dict[str, Any]:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Solve a scene, write its files and print its numbers.
+
+    Parameters
+    ----------
+    options
+        The options of the command `run`.
+
+    Returns
+    -------
+    int
+        The exit code: 0 if it is solved, to the accuracy asked for, else 1.
+
+    Raises
+    ------
+    InputError
+        If an argument of the scene is given twice, or as `contactopt.run` raises it.
+    """
     from contactopt.runner import run
 
     out = options.out or f"out/{Path(options.scene).stem}"
     names = ("mu", "force", "degree", "simplices")
     changes = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-    given = arguments_of(options.set)
+    given = _arguments_of(options.set)
     twice = sorted(set(given) & {*changes, *(["elements"] if options.elements is not None else [])})
     if twice:
         raise InputError(f"{twice[0]!r} is given twice, by --set and by --{twice[0]}.")
@@ -59,6 +76,10 @@ def run(options: argparse.Namespace) -> int:
         accuracy=options.accuracy,
         quantity=options.quantity,
         adaptive=options.adaptive,
+        simplest=options.simplest,
+        max_unknowns=options.max_unknowns,
+        time_limit=options.time_limit,
+        max_memory=options.max_memory,
         figures=tuple(options.figures),
         html=options.html,
         note=lambda text: None if silent else print(f"  {text}", file=sys.stderr, flush=True),
@@ -99,6 +120,8 @@ def _print_result(result: Any, out: str) -> None:
             f"contact half-width {s['contact_half_width']:.6g} {length}, "
             f"stick half-width {s['stick_half_width']:.6g} {length}"
         )
+    for remark in s["remarks"]:
+        print(f"note: {remark}")
     if result.estimate is not None:
         _print_estimate(result.estimate)
     seconds = s["seconds"]
@@ -115,6 +138,7 @@ def _print_estimate(estimate: Any) -> None:
 
 
 def view(options: argparse.Namespace) -> int:
+    """Write the page of a run and open it in the browser; returns the exit code 0."""
     import webbrowser
 
     from contactopt.figures.page import write_page
@@ -127,13 +151,23 @@ def view(options: argparse.Namespace) -> int:
 
 
 def show(options: argparse.Namespace) -> int:
+    """Print what a scene is: sketch, sizes, arguments and source; returns the exit code 0."""
     from contactopt.figures.sheet import describe
 
-    print(describe(options.scene, arguments_of(options.set)))
+    print(describe(options.scene, _arguments_of(options.set)))
+    return 0
+
+
+def simplify(options: argparse.Namespace) -> int:
+    from contactopt.analysis.simplest import simplify
+    from contactopt.runner import scene_of
+
+    print(simplify(scene_of(options.scene, **_arguments_of(options.set)), solve=not options.no_solve))
     return 0
 
 
 def new(options: argparse.Namespace) -> int:
+    """Write an example of a scene file; returns the exit code 0."""
     from contactopt.scenes.example import write_example
 
     write_example(Path(options.file))
@@ -142,6 +176,7 @@ def new(options: argparse.Namespace) -> int:
 
 
 def bench(options: argparse.Namespace) -> int:
+    """Execute the runs of an experiment file and write their report; returns the exit code, 130 if it was interrupted."""
     from contactopt.benchmark.campaign import run_campaign
     from contactopt.benchmark.page import refusals, report_campaign
     from contactopt.benchmark.store import load
@@ -172,6 +207,7 @@ def bench(options: argparse.Namespace) -> int:
 
 
 def report(options: argparse.Namespace) -> int:
+    """Rebuild the reports of benchmarks from their tables; returns the exit code 0."""
     from contactopt.benchmark.campaign import run_reports
     from contactopt.benchmark.page import report_campaign
 
@@ -187,6 +223,7 @@ def report(options: argparse.Namespace) -> int:
 
 
 def listing(options: argparse.Namespace) -> int:
+    """Print everything that can be chosen by its name; returns the exit code 0."""
     from contactopt.cli.lists import print_lists
 
     print_lists()
@@ -194,6 +231,7 @@ def listing(options: argparse.Namespace) -> int:
 
 
 def completion(options: argparse.Namespace) -> int:
+    """Print the completion script of a shell; returns the exit code 0."""
     from contactopt.cli.completion import script
     from contactopt.cli.parser import make_parser
 

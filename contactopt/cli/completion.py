@@ -47,7 +47,20 @@ complete -o default -F _contactopt contactopt"""
 
 
 def script(parser: argparse.ArgumentParser, shell: str) -> str:
-    """The completion script of a shell: bash, zsh or fish."""
+    """Write the completion script of a shell.
+
+    Parameters
+    ----------
+    parser
+        The parser of the command line, whose commands and options are completed.
+    shell
+        'bash', 'zsh' or 'fish'.
+
+    Returns
+    -------
+    str
+        The text of the script.
+    """
     options = _options(parser)
     if shell == "fish":
         return _fish(options)

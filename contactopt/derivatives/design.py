@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.checks import check_number, real_array
+from contactopt.derivatives.constants import FIRST_RADIUS, GOOD, GROW, SHRINK, TAKEN
 from contactopt.derivatives.parameters import Parameter, parameters, put_all
 from contactopt.derivatives.states import Step
 from contactopt.errors import InputError
@@ -37,10 +38,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-TAKEN, GOOD = 0.05, 0.7  # share of the promised gain from which on a step is taken, and the trust region grows
-SHRINK, GROW = 0.3, 2.0
 IDLE = 1e-10  # change of the forces, over what is usual, that is rounding
-FIRST = 0.1  # radius of the first trust region, in changes that move the pressure somewhere by the largest one
 SETTLED = 1e-6  # promised relative gain, and relative size of a trust region, at which the design ends
 
 
@@ -174,7 +172,7 @@ def design(
     if len(x) == 0:
         raise InputError("nothing is free; give shapes of the profile, or names of free parameters.")
     low, high = _bounds(bounds, which, m)
-    now, radius, visits, message = states.step(x, None), FIRST, [], "the steps ran out"
+    now, radius, visits, message = states.step(x, None), FIRST_RADIUS, [], "the steps ran out"
     visits.append(Visit(_peak(now), now.solution.residual, radius, True, len(now.sensitivity.weak)))
     slopes = states.slopes(now)
     steepest = np.abs(slopes / np.maximum(now.problem.areas, 1e-300)[:, None]).max(axis=0, initial=0.0)

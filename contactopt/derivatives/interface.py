@@ -97,7 +97,7 @@ class Sensitivity:
     def tangent(self) -> Tangent:
         """The matrix M, dimensionless."""
         scaled, scales = self._scaled
-        return Tangent(scaled, self._rho * scales.length / scales.force, slopes(self.problem, self._point))
+        return Tangent(scaled, self._rho * scales.length / scales.force, _slopes(self.problem, self._point))
 
     @cached_property
     def weak(self) -> tuple[Weak, ...]:
@@ -213,7 +213,7 @@ class Sensitivity:
         by_lam = _given("multipliers", multipliers, problem.s.shape)
         by_u = _given("displacements", displacements, problem.q.shape)
         if np.any(by_u):
-            by_r = by_r + transposed_product(problem.Q, by_u.ravel()).reshape(by_r.shape)
+            by_r = by_r + _transposed_product(problem.Q, by_u.ravel()).reshape(by_r.shape)
             by_lam = by_lam + problem.V.T @ by_u.ravel()
         z, a, b = self.tangent.solve_transposed((scales.force * by_r).ravel(), scales.multipliers * by_lam)
         by_q = by_u - self._moves * z.reshape(by_u.shape) / scales.length
@@ -284,14 +284,29 @@ def sensitivity(problem: InterfaceProblem, solution: Solution, distance: float |
     return Sensitivity(problem, solution, distance)
 
 
-def slopes(problem: InterfaceProblem, y: np.ndarray) -> np.ndarray:
-    """The derivative D (k, d, d) of the law's map at y; a contact without friction has no tangential force, even at rest."""
+def _slopes(problem: InterfaceProblem, y: np.ndarray) -> np.ndarray:
+    """Compute the derivative of the law's map at the points of the contacts.
+
+    A contact without friction has no tangential force, even at rest.
+
+    Parameters
+    ----------
+    problem
+        The interface problem, with k contacts in dim dimensions.
+    y
+        (k, dim) points r - rho u, normal first [force].
+
+    Returns
+    -------
+    ndarray
+        (k, dim, dim) derivatives D [-].
+    """
     D = problem.law.project(y)[1].copy()
     D[~problem.law.rough, 1:, :] = 0.0
     return D
 
 
-def transposed_product(Q: Interface, x: np.ndarray) -> np.ndarray:
+def _transposed_product(Q: Interface, x: np.ndarray) -> np.ndarray:
     """Q' x; an operator is symmetric."""
     return np.asarray(Q @ x if isinstance(Q, InterfaceOperator) else Q.T @ x)
 

@@ -42,7 +42,22 @@ class Weak:
 
 
 def weak_contacts(law: Law, y: np.ndarray, distance: float) -> tuple[Weak, ...]:
-    """The contacts whose point y (k, dim) lies within a distance [force] of a kink."""
+    """Find the contacts whose point lies near a kink of the law's map.
+
+    Parameters
+    ----------
+    law
+        The law of the contacts.
+    y
+        (k, dim) points r - rho u, normal first [force].
+    distance
+        How near counts [force].
+
+    Returns
+    -------
+    tuple
+        The contacts with the names of the kinks at which they are.
+    """
     kinks = law.kinks(y, distance)
     names = {
         (True, False): "open / closed",

@@ -21,24 +21,23 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, gmres, splu
 
+from contactopt.derivatives.constants import INNER, ROUND
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.coupled import CoupledForm
 from contactopt.problem.operators import InterfaceOperator
 from contactopt.problem.stacked import Stacked, Vector, norm
-from contactopt.solving.constants import LOOSE
+from contactopt.solving.constants import LOOSE, SLIPPING
 from contactopt.solving.kernels.bonded import Bonded
 from contactopt.solving.kernels.coupled import fitted
 from contactopt.solving.kernels.flexible import flexible_gmres
 from contactopt.solving.kernels.krylov import model_of
-from contactopt.solving.kernels.linearised import SLIPPING
 from contactopt.solving.preconditioners import Preconditioner
 
 SINGULAR = 1e-13  # reciprocal condition of K below which it counts as singular
 ACCURACY = 1e-11  # relative residual of an iterative solve
-ROUND, INNER = 1e-4, 1e-6  # reduction of the residual by one round of GMRES, and by GMRES for the model of Q
-ROUNDS = 12
-RESTART, CYCLES = 60, 3
+ROUNDS = 12  # of GMRES, which gain four digits each
+RESTART, CYCLES = 60, 3  # of GMRES
 UNIQUE = (
     "the solution has no derivative, because its linear system is singular: forces or motions are not unique there; remove "
     "redundant contacts, or hold the bodies."
@@ -221,7 +220,7 @@ class Krylov:
     def __init__(self, tangent: Tangent, P: Preconditioner | None = None):
         self.tangent = tangent
         self.P = model_of(tangent.problem) if P is None else P
-        self.rough = {flag: rough_inverse(tangent, self.P, flag) for flag in (False, True)}
+        self.rough = {flag: _rough_inverse(tangent, self.P, flag) for flag in (False, True)}
 
     def product(self, x: np.ndarray, transposed: bool, act: Act) -> np.ndarray:
         """K x or K' x (n + p,), where act makes the products with Q or its model."""
@@ -252,7 +251,7 @@ class Krylov:
             return self.product(x, transposed, lambda y: Q @ y)
 
         inverse = self.inverse(transposed)
-        return refined(product, lambda rest: _gmres(product, rest, ROUND, inverse), right, np.ones(len(right)))
+        return _refined(product, lambda rest: _gmres(product, rest, ROUND, inverse), right, np.ones(len(right)))
 
 
 class Coupled:
@@ -293,14 +292,36 @@ class Coupled:
         weights = Stacked((*(form.diagonal() ** -0.5).parts, np.concatenate([share, np.ones(len(tangent.problem.s))])))
         none = form.pulled(np.zeros(tangent.problem.q.size))
         whole = Stacked((*none.parts, right))
-        found = refined(
+        found = _refined(
             product, lambda rest: flexible_gmres(product, precondition, rest, weights, ROUND), whole, weights
         )
         return np.asarray(found.parts[-1])
 
 
-def refined(product: Callable[[Any], Any], solve: Callable[[Any], Any], right: Vector, weights: Vector) -> Any:
-    """x with |W (right - A x)| <= ACCURACY |W right| from solves of what is left; InputError if that is out of reach."""
+def _refined(product: Callable[[Any], Any], solve: Callable[[Any], Any], right: Vector, weights: Vector) -> Any:
+    """Solve A x = b to the accuracy ACCURACY by solving again for what is left.
+
+    Parameters
+    ----------
+    product
+        x -> A x.
+    solve
+        b -> an approximate solution x.
+    right
+        The right-hand side b, an array (n,) or a vector in parts.
+    weights
+        Weights W of the rows, like b; the residual is measured by |W (b - A x)| / |W b|.
+
+    Returns
+    -------
+    ndarray or Stacked
+        The solution x.
+
+    Raises
+    ------
+    InputError
+        If the accuracy is out of reach, because the solution is not unique.
+    """
     x, rest = 0.0 * right, right
     size = last = norm(weights * right)
     for _ in range(ROUNDS):
@@ -317,7 +338,7 @@ def refined(product: Callable[[Any], Any], solve: Callable[[Any], Any], right: V
     return x
 
 
-def rough_inverse(tangent: Tangent, P: Preconditioner, transposed: bool) -> Act:
+def _rough_inverse(tangent: Tangent, P: Preconditioner, transposed: bool) -> Act:
     """P where a component is held by contact, the identity where it slips, bordered by the balance."""
     closed, d, V = tangent.closed, tangent.D.shape[1], tangent.problem.V[tangent.closed]
     n = len(closed)

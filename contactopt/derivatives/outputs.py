@@ -5,10 +5,11 @@
                                  of one pair of several as normal_force:PAIR
     resultant:PAIR:COMPONENT     of the contact forces on the upper body of a pair, in the coordinates of space [force]
     pressure:CONTACT             at one contact, by its number [stress]
+    pressure@X,Y                 at a place, and the stresses of contactopt.analysis.places: von_mises:BODY:BOUNDARY, ...
     energy                       elastic energy of all bodies [force length]
-    pressure, width, stick       the smooth readings of contactopt.analysis.quantities
+    pressure, width, stick       the smooth readings of contactopt.analysis.quantities; of one pair of several pressure:PAIR
 
-The last three are formulas over many forces. Their derivative by the force at each closed contact is a central
+A largest stress has the derivative of the stress at the place where it is largest. The last three are formulas over many forces. Their derivative by the force at each closed contact is a central
 difference of the reading, which solves nothing; what the parameters do to the forces is exact.
 """
 
@@ -22,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.edges import contact_edge, stick_edge
+from contactopt.analysis.places import PLACED, Place, map_of, place_of, pressure_weights, read_stress
 from contactopt.analysis.quantities import QUANTITIES, elastic_energy
-from contactopt.analysis.resultants import planes_of
+from contactopt.analysis.resultants import planes_of, views
 from contactopt.derivatives.parameters import MATERIAL, Parameter
 from contactopt.derivatives.states import Seeds, Step
 from contactopt.errors import InputError
@@ -54,16 +56,41 @@ class Functional:
 
 
 def seeds_of(quantity: Any, step: Step) -> Seeds:
-    """The value and the derivatives of a quantity, by its name or as a function of the state; InputError for an unknown one."""
+    """Differentiate a quantity of a solved state.
+
+    Parameters
+    ----------
+    quantity
+        A name from this module's head, or a function of the state that returns Seeds.
+    step
+        The solved state.
+
+    Returns
+    -------
+    Seeds
+        The value of the quantity, and its derivatives by forces, multipliers and displacements.
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity.
+    """
     if callable(quantity):
         return quantity(step)
     if not isinstance(quantity, str):
         raise InputError(f"a quantity is given by its name; got {quantity!r}.")
+    place = place_of(quantity, step.reduction.scene)
+    if place is not None:
+        return (
+            Functional(pressure_weights(place, step.reduction))(step)
+            if place.kind == "pressure"
+            else _stress(step, place)
+        )
     kind, *rest = quantity.split(":")
     if quantity == "stick":
         return _stick(step)
-    if quantity in READINGS:
-        return _reading(quantity, step)
+    if kind in ("pressure", "width") and (not rest or (len(rest) == 1 and not rest[0].isdigit())):
+        return _reading(kind, step, _pair(step, rest[0]) if rest else None)
     if quantity == "energy":
         return _energy(step)
     if quantity in ("approach", "shift"):
@@ -74,7 +101,7 @@ def seeds_of(quantity: Any, step: Step) -> Seeds:
         return _resultant(step, *rest)
     if kind == "pressure" and len(rest) == 1:
         return _pressure_at(step, rest[0])
-    known = ", ".join((*LINEAR, *READINGS, "energy", "resultant:PAIR:COMPONENT", "pressure:CONTACT"))
+    known = ", ".join((*LINEAR, *READINGS, "energy", "resultant:PAIR:COMPONENT", "pressure:CONTACT", *PLACED))
     raise InputError(f"unknown quantity {quantity!r}; choose from {known}.")
 
 
@@ -147,19 +174,49 @@ def _energy(step: Step) -> Seeds:
     return Seeds(value, by_r.reshape(step.problem.q.shape), bodies=tuple(by_U), explicit=explicit)
 
 
-def _reading(name: str, step: Step) -> Seeds:
-    """A quantity of contactopt.analysis that reads the normal forces, differentiated at closed contacts."""
-    reduction, r = replace(step.reduction, problem=step.problem), step.solution.reactions
-    read, by_r = QUANTITIES[name], np.zeros(r.shape)
-    for i in _few(name, np.flatnonzero(step.problem.law.pressed(r))):
+def _stress(step: Step, place: Place) -> Seeds:
+    """A stress inside a body: a function of its displacement U, which follows the contact forces by its compliance.
+
+    The multipliers do not enter, since the free motions that they stand for strain nothing.
+    """
+    found = read_stress(place, step.reduction, step.displaced)
+    number, body, U = found.body, step.reduction.bodies[found.body], step.displaced[found.body]
+    own = found.map.transposed(found.slopes)
+    moved = body.displacement(own, np.zeros(len(body.resultants))) - body.at_rest
+    by_r = (step.reduction.maps[number] @ moved).reshape(step.problem.q.shape)
+
+    def explicit(which: Parameter) -> float:
+        part = step.reduction.scene.parts[number]
+        if which.kind not in MATERIAL or not which.concerns(part):
+            return 0.0
+        if which.kind == "E":
+            return found.value / found.map.body.material.E
+        by_poisson = map_of(place, step.reduction, by_poisson=True)
+        return float(np.sum(found.slopes * by_poisson.stress(U)))
+
+    bodies = tuple(own if i == number else None for i in range(len(step.displaced)))
+    return Seeds(found.value, by_r, bodies=bodies, explicit=explicit, stress=found)
+
+
+def _reading(name: str, step: Step, pair: slice | None) -> Seeds:
+    """A quantity of contactopt.analysis that reads the normal forces, of all contacts or one pair, at closed contacts."""
+    reduction, solution = replace(step.reduction, problem=step.problem), step.solution
+    if pair is not None:
+        number = [made.contacts for made in step.problem.pairs].index(pair)
+        reduction, solution = views(reduction, solution)[number]
+    read, r = QUANTITIES[name], solution.reactions
+    by_r = np.zeros(r.shape)
+    for i in _few(name, np.flatnonzero(reduction.problem.law.pressed(r))):
 
         def at(h: float, i: int = i) -> float:
             there = r.copy()
             there[i, 0] += h
-            return read(reduction, replace(step.solution, reactions=there))
+            return read(reduction, replace(solution, reactions=there))
 
         by_r[i, 0] = _central(at, STEP * float(np.abs(r[i]).max()))
-    return Seeds(read(reduction, step.solution), by_r)
+    whole = np.zeros(step.problem.q.shape)
+    whole[pair or slice(None)] = by_r
+    return Seeds(read(reduction, solution), whole)
 
 
 def _stick(step: Step) -> Seeds:

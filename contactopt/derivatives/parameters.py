@@ -167,7 +167,25 @@ class Parameter:
 
 
 def parameter(name: Any, scene: Scene) -> Parameter:
-    """The parameter of that name; InputError unless it enters the scene."""
+    """Find one parameter of a scene by its name.
+
+    Parameters
+    ----------
+    name
+        A name in the form that this module's head lists.
+    scene
+        The scene that the parameter belongs to.
+
+    Returns
+    -------
+    Parameter
+        The parameter.
+
+    Raises
+    ------
+    InputError
+        If the name is unknown or what it names does not enter the scene.
+    """
     if not isinstance(name, str) or not name:
         raise InputError(f"a parameter is given by its name, such as 'mu' or 'E:upper'; got {name!r}.")
     kind, *rest = name.split(":")
@@ -190,7 +208,25 @@ def parameter(name: Any, scene: Scene) -> Parameter:
 
 
 def parameters(names: Any, scene: Scene) -> tuple[Parameter, ...]:
-    """The parameters of these names, each once; InputError if one does not enter the scene."""
+    """Find the parameters of a scene by their names.
+
+    Parameters
+    ----------
+    names
+        One name or several, in the form that this module's head lists.
+    scene
+        The scene that they belong to.
+
+    Returns
+    -------
+    tuple
+        The parameters in the order of the names.
+
+    Raises
+    ------
+    InputError
+        If a parameter is named twice or does not enter the scene, or if none is named.
+    """
     if isinstance(names, str):
         names = (names,)
     found = tuple(parameter(name, scene) for name in names)
@@ -200,7 +236,20 @@ def parameters(names: Any, scene: Scene) -> tuple[Parameter, ...]:
 
 
 def put_all(scene: Scene, values: Mapping[Parameter, float]) -> Scene:
-    """The scene with all these values."""
+    """Give a scene other values of several parameters.
+
+    Parameters
+    ----------
+    scene
+        The scene, which stays as it is.
+    values
+        The values by their parameters, in the units of each.
+
+    Returns
+    -------
+    Scene
+        The scene with these values.
+    """
     for which, value in values.items():
         scene = which.put(scene, float(value))
     return scene

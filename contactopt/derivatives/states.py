@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.paths import PathResult
+from contactopt.analysis.places import StressReading
 from contactopt.checks import real_array
 from contactopt.derivatives.interface import Change, Dual, Sensitivity, sensitivity
 from contactopt.derivatives.kinks import Weak
@@ -43,7 +44,7 @@ class Seeds:
 
     reactions (k, dim), multipliers (p,), displacements (k, dim) of u, slip (k, dim) of u measured from the state before,
     bodies: (n,) by U of each body at fixed forces and
-    multipliers;  explicit: by a scalar parameter at fixed forces, multipliers and displacements
+    multipliers;  explicit: by a scalar parameter at fixed forces, multipliers and displacements;  stress: the reading of a stress
     """
 
     value: float
@@ -53,6 +54,7 @@ class Seeds:
     slip: Any = None
     bodies: tuple[Any, ...] = ()
     explicit: Callable[[Parameter], float] = field(default=lambda which: 0.0)
+    stress: StressReading | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +100,18 @@ class Step:
         return tuple(B.T @ self.solution.reactions.ravel() for B in self.reduction.maps)
 
     def law_change(self, which: Parameter) -> np.ndarray:
-        """Derivative (k,) of the law's parameter by the friction of pairs of surfaces."""
+        """Differentiate the law's parameter by the friction of pairs of surfaces.
+
+        Parameters
+        ----------
+        which
+            The parameter, which names the pairs.
+
+        Returns
+        -------
+        ndarray
+            (k,) derivatives.
+        """
         out, areas = np.zeros(self.problem.contacts), self.problem.areas
         chosen = [pair.name for pair in which.pairs(self.reduction.scene)]
         for pair, made in zip(self.reduction.scene.pairs, self.problem.pairs):
@@ -108,7 +121,20 @@ class Step:
         return out
 
     def loads(self, which: Parameter, number: int) -> tuple[Any, Any, float]:
-        """The scene and the body's part with a load changed by a step, and the step: bodies are affine in their loads."""
+        """Change a load by a step. Bodies are affine in their loads, so that a step of any size gives the derivative.
+
+        Parameters
+        ----------
+        which
+            The parameter that is a load.
+        number
+            The number of the body among the parts of the scene.
+
+        Returns
+        -------
+        tuple
+            The changed scene, the part of it that stands for the body, and the step.
+        """
         scene = self.reduction.scene
         value = which.read(scene)
         step = abs(value) or 1.0
@@ -116,7 +142,20 @@ class Step:
         return changed, changed.parts[number], step
 
     def explicit(self, direction: Direction, base: Reduction) -> Explicit:
-        """What the direction changes; `base` has the materials, whose matrices are kept there."""
+        """Compute what a direction changes at fixed forces and multipliers.
+
+        Parameters
+        ----------
+        direction
+            The parameters that change, and by how much.
+        base
+            The reduction that has the materials, whose matrices are kept there.
+
+        Returns
+        -------
+        Explicit
+            The changes of displacement, balance, law and bodies.
+        """
         problem = self.problem
         du, dmu = np.zeros(problem.q.shape), np.zeros(problem.contacts)
         dU = [np.zeros(len(U)) for U in self.displaced]
@@ -146,7 +185,22 @@ class Step:
         return Explicit(du, np.concatenate(ds), dmu, tuple(dU))
 
     def work(self, which: Parameter, dual: Duals, base: Reduction) -> Any:
-        """The derivative by one parameter from the gradient by the data of the problem."""
+        """Compute the derivative by one parameter from the gradient by the data of the problem.
+
+        Parameters
+        ----------
+        which
+            The parameter.
+        dual
+            The gradient by q, s and mu, and what it is on the bodies.
+        base
+            The reduction that has the materials, whose matrices are kept there.
+
+        Returns
+        -------
+        float or ndarray
+            The derivative; (k,) for a parameter with one number per contact.
+        """
         if which.kind == "gap":
             return dual.q[:, 0]
         if which.kind == "friction":
@@ -249,7 +303,22 @@ class Chain:
 
 
 def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
-    """The change of a function of a state along a direction, from what Chain.forward gives."""
+    """Compute the change of a function of a state along a direction.
+
+    Parameters
+    ----------
+    seeds
+        The derivatives of the function by the reactions, multipliers, displacements and slip of the state.
+    moved
+        The changes of the state along the direction, from `Chain.forward`.
+    direction
+        The parameters that change, and by how much.
+
+    Returns
+    -------
+    float
+        The directional derivative, in the unit of the function.
+    """
     total = sum(amount * seeds.explicit(which) for which, amount in direction.items() if not which.is_field)
     for weight, part in (
         (seeds.reactions, moved.change.reactions),
@@ -264,9 +333,25 @@ def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
 
 
 def chain_of(result: Any, distance: float | None = None) -> Chain:
-    """The solved states of a result: of contactopt.run, contactopt.follow, or anything with a reduction and a solution.
+    """Make a chain of the solved states of a result, to differentiate through.
 
-    Raises InputError for anything else, and for a state that is not certified.
+    Parameters
+    ----------
+    result
+        What contactopt.run or contactopt.follow returned, or anything else with a reduction and a solution.
+    distance
+        How near to a kink a contact counts as weakly active, over the largest force [-]; by default as in
+        `sensitivity`.
+
+    Returns
+    -------
+    Chain
+        The states in their order.
+
+    Raises
+    ------
+    InputError
+        For a result without a solved scene, and for a state that is not certified.
     """
     path = result if isinstance(result, PathResult) else getattr(result, "path", None)
     if path is None:
@@ -301,17 +386,31 @@ def solved_chain(
     starts: Sequence[Solution] | None = None,
     Q: str = "auto",
 ) -> Chain:
-    """The certified states of a load path, without their energies; a path of one scene is one state.
+    """Solve the states of a load path, without their energies, and make a chain of them. A path of one scene is one
+    state.
 
     Parameters
     ----------
-    scenes : the states in their order
-    tol : bound on the certificate of every state
-    base : a reduction of the same bodies, which is then only loaded anew
-    starts : a solution for every state, to start from
-    Q : form of Q, as for contactopt.reduce
+    scenes
+        The states in their order.
+    tol
+        Bound on the certificate of every state.
+    base
+        A reduction of the same bodies, which is then only loaded anew.
+    starts
+        A solution for every state, to start from.
+    Q
+        Form of Q, as for contactopt.reduce.
 
-    Raises InputError where a state has no solution or is not solved.
+    Returns
+    -------
+    Chain
+        The certified states in their order.
+
+    Raises
+    ------
+    InputError
+        Where a state has no solution or is not solved.
     """
     steps: list[Step] = []
     before = None

@@ -18,13 +18,26 @@ __all__ = ["read", "write"]
 
 
 def read(path: str | Path) -> InterfaceProblem:
-    """The problem in a file: FCLib's HDF5, local or global form, or Siconos' text format with any of its storages.
+    """Read a problem from a file: FCLib's HDF5, local or global form, or Siconos' text format with any of its storages.
 
     Equality constraints are kept: V, s from `R, vectors/s` of the mixed form are the problem's balance. A stored
     solution is ignored. Sizes are compared with what the file holds before memory is taken for them; links to other
     files are not followed.
 
-    Raises InputError, naming the file, if it is missing, no regular file, or malformed.
+    Parameters
+    ----------
+    path
+        The file. Its first bytes tell the format, not its name.
+
+    Returns
+    -------
+    InterfaceProblem
+        The problem in the units of the file. Its Q is sparse where the matrix of the file is mostly zeros.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, no regular file, or malformed. The message names the file.
     """
     try:
         path = Path(path)

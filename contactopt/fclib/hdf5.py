@@ -36,7 +36,25 @@ def _h5py() -> Any:
 
 
 def read_hdf5(path: Path) -> InterfaceProblem:
-    """The problem in an HDF5 file, local or global form; any exception of h5py if it is malformed."""
+    """Read the problem in an HDF5 file, in local or in global form.
+
+    Exceptions of h5py on a malformed file are not caught here; `contactopt.fclib.read` makes an InputError of them.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    InterfaceProblem
+        The problem in the units of the file.
+
+    Raises
+    ------
+    InputError
+        If the file holds neither form, if its data lie in other files or are malformed, or if h5py is not installed.
+    """
     h5py = _h5py()
     with h5py.File(path, "r") as file:
         if "fclib_local" in file:
@@ -69,8 +87,22 @@ def write(problem: InterfaceProblem, path: str | Path, title: str = "", descript
     """Write a problem in FCLib's local form; read() gives back the same numbers.
 
     With a balance (V, s) it is the mixed form u = W r + V lambda + q, R u-part zero: groups V, R and vectors/s.
-    The file appears complete or not at all. Raises InputError for other laws than Coulomb's, which FCLib cannot express, for
-    a Q that is known by its products only, and for a folder that cannot be written to.
+    The file appears complete or not at all.
+
+    Parameters
+    ----------
+    problem
+        The problem, under Coulomb's law.
+    path
+        Where the file shall be.
+    title, description
+        Texts that the file keeps about the problem.
+
+    Raises
+    ------
+    InputError
+        On other laws than Coulomb's, which FCLib cannot express; on a Q that is known by its products only; on a folder
+        that cannot be written to; and where h5py is not installed.
     """
     if not isinstance(problem, InterfaceProblem):
         raise InputError(f"what is written must be an InterfaceProblem; got {type(problem).__name__}.")
@@ -110,13 +142,13 @@ def _read_global(group: Any) -> InterfaceProblem:
     f = _array(group, "vectors/f").astype(float)
     M = _read_matrix(_item(group, "M"), (len(f), len(f)))
     H = _read_matrix(_item(group, "H"), (len(f), w.size))
-    solve = inverse_of(M)
+    solve = _inverse_of(M)
     W = sp.csr_array(H.T @ solve(H))
     q = H.T @ solve(sp.csr_array(f[:, None])).toarray()[:, 0] + w.ravel()
     return InterfaceProblem(compact(W), q.reshape(-1, dim), mu)
 
 
-def inverse_of(M: sp.csr_array) -> Callable[[sp.csr_array], sp.csr_array]:
+def _inverse_of(M: sp.csr_array) -> Callable[[sp.csr_array], sp.csr_array]:
     """X -> M^-1 X for sparse X. Blocks of rigid bodies are inverted one by one, other matrices are factorised.
 
     RuntimeError or LinAlgError if M is singular.

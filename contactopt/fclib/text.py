@@ -44,7 +44,25 @@ class _Numbers:
 
 
 def read_text(path: Path) -> InterfaceProblem:
-    """The problem in a text file; InputError or ValueError if it is malformed."""
+    """Read the problem in a text file of Siconos.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    InterfaceProblem
+        The problem in the units of the file, without a balance.
+
+    Raises
+    ------
+    InputError
+        If the sizes or the storage that the file names do not exist or do not fit.
+    ValueError
+        If what should be a number is none. `contactopt.fclib.read` makes an InputError of it.
+    """
     text = path.read_text(encoding="ascii", errors="replace")
     head = text.split(maxsplit=5)
     dim, contacts, storage, rows, columns = (_Numbers(head[:5]).integers(5)).tolist()
@@ -67,7 +85,18 @@ def read_text(path: Path) -> InterfaceProblem:
 
 
 def compact(W: Interface) -> Interface:
-    """The matrix as an array if more than a third of its entries are there, else as it is."""
+    """Choose the storage of a matrix: an array if more than a third of its entries are there, else sparse.
+
+    Parameters
+    ----------
+    W
+        The (k dim, k dim) matrix, an array or sparse.
+
+    Returns
+    -------
+    ndarray or csr_array
+        The matrix as an array, or as it was given.
+    """
     full = sp.issparse(W) and W.nnz >= MOSTLY * W.shape[0] * W.shape[1]
     return np.asarray(W.toarray()) if full else W
 

@@ -43,13 +43,24 @@ def energies(path: PathResult, ax: Any = None) -> Any:
 
 
 def path_figure(path: PathResult) -> Any:
-    """Loop and energies side by side; a Figure."""
+    """Draw the loop of force and displacement of a load path, and its energies below.
+
+    Parameters
+    ----------
+    path
+        The solved load path.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
+    """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10.8, 4.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    loop(path, left)
-    energies(path, right)
+    figure = Figure(figsize=(5.6, 7.2), layout="constrained")
+    above, below = figure.subplots(2, 1)
+    loop(path, above)
+    energies(path, below)
     scene = path.states[-1].scene
     figure.suptitle(f"{scene.name}, {scene.friction}: {len(path.states)} states")
     return figure

@@ -7,16 +7,35 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.bodies.elements import elements_of
+from contactopt.figures.pieces import mesh_lines, outline, pieces, segments, surface, triangles
+from contactopt.figures.solids import View, draw_frame, picture
 from contactopt.figures.style import make_axes
 from contactopt.interface.recovery import Fields
 from contactopt.problem import InterfaceProblem
 from contactopt.scenes.scene import Scene
 
 ELEVATION, AZIMUTH = 22.0, -130.0  # degrees, from where solids are seen
+PIXELS = 800  # of the longer side of the picture of solids, more than it takes in a PNG file
 
 
 def magnification(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields]) -> float:
-    """Factor by which displacements are drawn: a round number, 1 where bodies are apart at first."""
+    """Choose the factor by which displacements are drawn: a round number, 1 where bodies are apart at first.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    problem
+        Its interface problem.
+    fields
+        The displacements of its bodies.
+
+    Returns
+    -------
+    float
+        The factor, at least 1.
+    """
     displacement = max(float(np.abs(f.displacement).max()) for f in fields)
     if displacement == 0 or np.ptp(problem.q[:, 0]) > 1e-3 * displacement:
         return 1.0
@@ -29,23 +48,52 @@ def magnification(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fiel
 
 
 def deformed(scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], ax: Any = None) -> Any:
-    """Deformed bodies coloured by von Mises stress, mirrored to the whole section (paper, figures 1 and 2)."""
+    """Draw the deformed bodies coloured by von Mises stress, mirrored to the whole section (paper, figures 1 and 2).
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    problem
+        Its interface problem.
+    fields
+        Displacements and stresses of its bodies.
+    ax
+        Axes to draw on; by default new ones.
+
+    Returns
+    -------
+    Axes
+        The axes.
+    """
     scale = magnification(scene, problem, fields)
     top = float(np.quantile(np.concatenate([f.von_mises for f in fields]), 0.998)) or 1.0
     if scene.dim == 3:
         ax = _draw_solid(scene, fields, scale, top, ax)
     else:
         ax = _draw_section(scene, fields, scale, top, ax, mirror_plane(scene, problem))
-    times = f", displacements x {scale:g}" if scale != 1 else ""
+    times = f"\ndisplacements x {scale:g}" if scale != 1 else ""
     ax.set_title(f"{scene.name}: deformed bodies, {scene.friction}{times}")
     return ax
 
 
 def mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] | None:
-    """Coordinate axis of a plane section and place on it beyond which the bodies are mirrored; None: they are whole.
+    """Find beyond which place of a plane section the bodies are mirrored.
 
     It is the axis of revolution, or the plane of symmetry of a half model: that cuts the contact line at the origin of
     its chart, across the line.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    problem
+        Its interface problem.
+
+    Returns
+    -------
+    tuple or None
+        The number of a coordinate axis and the place on it [length]; None where the bodies are whole.
     """
     if scene.kind == "axisymmetric":
         return 0, 0.0
@@ -62,28 +110,36 @@ def _draw_section(
 ) -> Any:
     from matplotlib.collections import LineCollection
 
-    ax = make_axes(ax)
+    ax, bar = (ax, None) if ax is not None else _placed_axes()
     axis, place = plane or (0, 0.0)
     for f in fields:
         points = f.mesh.p + scale * f.displacement
-        corners = f.mesh.t.T
-        cells = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]) if corners.shape[1] == 4 else corners
-        outline = f.mesh.facets[:, f.mesh.boundary_facets()]
+        kind, elements = elements_of(f.mesh)
+        cells, rim = triangles(pieces(kind, elements)), segments(outline(kind, elements)).T
         if plane is not None:  # the plane of symmetry is no edge of the whole body
-            outline = outline[:, ~np.all(np.isclose(f.mesh.p[axis][outline], place), axis=0)]
+            rim = rim[:, ~np.all(np.isclose(f.mesh.p[axis][rim], place), axis=0)]
         for image in (False, True) if plane is not None else (False,):
             x = points.copy()
             x[axis] = 2 * place - x[axis] if image else x[axis]
             colours = ax.tripcolor(*x, cells, f.von_mises, shading="gouraud", cmap="viridis", vmin=0, vmax=top)
-            ax.add_collection(LineCollection(x.T[outline.T], colors="black", linewidths=0.6))
+            ax.add_collection(LineCollection(x.T[rim.T], colors="black", linewidths=0.6))
     across, up = scene.components
     ax.autoscale_view()
     ax.set(xlabel=f"{across} [{scene.units[0]}]", ylabel=f"{up} [{scene.units[0]}]", aspect="equal")
     reach = _reach(scene, fields)
     if reach is not None:
         ax.set(xlim=(-reach, reach), ylim=(-0.9 * reach, 0.6 * reach))
-    ax.figure.colorbar(colours, ax=ax, label=f"von Mises stress [{scene.units[1]}]", extend="max", shrink=0.8)
+    room = {"ax": ax, "shrink": 0.8} if bar is None else {"cax": bar}
+    ax.figure.colorbar(colours, label=f"von Mises stress [{scene.units[1]}]", extend="max", **room)
     return ax
+
+
+def _placed_axes() -> tuple[Any, Any]:
+    """Axes of a new figure and those of its colour bar, at fixed places: working out places takes as long as drawing."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.8))
+    return figure.add_axes((0.12, 0.11, 0.68, 0.77)), figure.add_axes((0.84, 0.19, 0.03, 0.65))
 
 
 def _reach(scene: Scene, fields: Sequence[Fields]) -> float | None:
@@ -94,69 +150,32 @@ def _reach(scene: Scene, fields: Sequence[Fields]) -> float | None:
 
 
 def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float, ax: Any) -> Any:
-    """The faces of all bodies that look at the viewer, in one collection, so that nearer ones hide those behind them.
-
-    The projection is parallel, so that which faces look at the viewer depends on their normals alone.
-    """
+    """The surfaces of all bodies with a depth buffer, so that nearer ones hide those behind them."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
-    ax = make_axes(ax, projection="3d")
-    ax.set_proj_type("ortho")
-    shade = ScalarMappable(Normalize(0, top), "viridis")
-    drawn, colours = [], []
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    ax = make_axes(ax)
+    shade, view = ScalarMappable(Normalize(0, top), "viridis"), View(ELEVATION, AZIMUTH)
+    drawn = []
     for f in fields:
-        points = (f.mesh.p + scale * f.displacement).T
-        boundary = f.mesh.boundary_facets()
-        facets = in_cycle(f.mesh.facets[:, boundary].T, points)
-        seen = outward_normals(f.mesh, boundary, facets, points) @ towards_viewer(ELEVATION, AZIMUTH) > 0
-        drawn += list(points[facets[seen]])
-        colours.append(shade.to_rgba(f.von_mises[facets[seen]].mean(axis=1)))
-        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
-    faces = Poly3DCollection(drawn, facecolors=np.concatenate(colours), edgecolors=(0, 0, 0, 0.15), linewidths=0.2)
-    faces.set_zsort("average")
-    ax.add_collection3d(faces)
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_box_aspect(high - low)
-    ax.view_init(elev=ELEVATION, azim=AZIMUTH)
-    ax.set(xlabel=f"x [{scene.units[0]}]", ylabel=f"y [{scene.units[0]}]", zlabel=f"z [{scene.units[0]}]")
-    ax.figure.colorbar(shade, ax=ax, label=f"von Mises stress [{scene.units[1]}]", extend="max", shrink=0.7, pad=0.12)
+        move = np.nan_to_num(f.displacement, posinf=0.0, neginf=0.0)  # of bodies that fly away, which are drawn at rest
+        points = (f.mesh.p + scale * move).T
+        plane, faces = surface(*elements_of(f.mesh), points)
+        cells = triangles(pieces(plane, faces))
+        opposite = np.stack([cells[:, [1, 2]], cells[:, [2, 0]], cells[:, [0, 1]]], axis=1)
+        lined = np.isin(_key(opposite, len(points)), _key(segments(mesh_lines(plane, faces)), len(points)))
+        drawn.append((points[cells], f.von_mises[cells], lined))
+    corners, values, lined = (np.concatenate(parts) for parts in zip(*drawn))
+    image, extent = picture(view.project(corners), values, lined, shade.to_rgba, PIXELS)
+    ax.imshow(image, extent=extent, origin="lower", aspect="equal", zorder=2)
+    names = [f"{name} [{scene.units[0]}]" for name in scene.components]
+    draw_frame(ax, view, corners.min(axis=(0, 1)), corners.max(axis=(0, 1)), names)
+    ax.set_axis_off()
+    ax.margins(0.12)
+    ax.figure.colorbar(shade, ax=ax, label=f"von Mises stress [{scene.units[1]}]", extend="max", shrink=0.7, pad=0.04)
     return ax
 
 
-def towards_viewer(elevation: float, azimuth: float) -> np.ndarray:
-    """Unit vector (3,) from the bodies to the eye; angles in degrees as in Matplotlib."""
-    e, a = np.radians(elevation), np.radians(azimuth)
-    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-
-
-def outward_normals(mesh: Any, boundary: np.ndarray, facets: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Normals (m, 3), of no particular length, that point out of the body: away from the centre of each facet's cell.
-
-    facets  (m, c) corners of the facets `boundary` (m,) of the mesh in the order of their perimeter;  points (n, 3)
-    """
-    corners = points[facets]
-    diagonals = (corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1])
-    normals = np.cross(*diagonals) if facets.shape[1] == 4 else np.cross(corners[:, 1] - corners[:, 0], diagonals[0])
-    cells = points[mesh.t[:, mesh.f2t[0, boundary]].T].mean(axis=1)
-    outside = np.sum(normals * (corners.mean(axis=1) - cells), axis=1)
-    return np.asarray(np.where(outside >= 0, 1.0, -1.0)[:, None] * normals)
-
-
-def in_cycle(facets: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Corners of quadrilateral facets in the order of their perimeter: the farthest from the first comes third."""
-    if facets.shape[1] != 4:
-        return facets
-    centre = points[facets].mean(axis=1, keepdims=True)
-    arms = points[facets] - centre
-    first, second = arms[:, 0], arms[:, 1]
-    normal = np.cross(first, second)
-    normal[np.linalg.norm(normal, axis=1) == 0] = 1.0
-    side = np.cross(normal, first)
-    angle = np.arctan2(
-        np.einsum("fic,fc->fi", arms, side) / np.linalg.norm(side, axis=1)[:, None],
-        np.einsum("fic,fc->fi", arms, first) / np.linalg.norm(first, axis=1)[:, None],
-    )
-    return np.asarray(np.take_along_axis(facets, np.argsort(angle, axis=1), axis=1))
+def _key(pairs: np.ndarray, count: int) -> np.ndarray:
+    """One number for every pair (..., 2) of nodes, whatever their order, of `count` nodes."""
+    return np.asarray(pairs.min(axis=-1) * count + pairs.max(axis=-1))

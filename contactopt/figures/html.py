@@ -24,6 +24,8 @@ from contactopt.files import whole_file
 POLICY = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:"
 KINDS = {"f": ("f4", "<f4"), "i": ("i4", "<i4"), "u": ("i4", "<i4"), "b": ("i4", "<i4")}
 
+SHORT = 65535  # the largest number of two bytes
+
 
 def check_installed() -> None:
     """Raise InputError unless plotly is installed, of which the pages hold a copy."""
@@ -32,27 +34,58 @@ def check_installed() -> None:
 
 
 def packed(array: Any) -> dict[str, Any]:
-    """An array for the data of a page: numbers of four bytes each."""
+    """Pack an array for the data of a page, as numbers of four bytes each.
+
+    Parameters
+    ----------
+    array
+        Numbers or truth values of any shape.
+
+    Returns
+    -------
+    dict
+        Its type, its shape, and its bytes as text.
+    """
     array = np.asarray(array)
     name, kind = KINDS[array.dtype.kind]
     data = np.ascontiguousarray(array.astype(kind))
     return {"type": name, "shape": list(array.shape), "data": base64.b64encode(data.tobytes()).decode()}
 
 
+def packed_short(array: np.ndarray) -> dict[str, Any]:
+    """An array for the data of a page: numbers of two bytes each, which divide the range of the array into 65535 steps."""
+    low, high = float(array.min(initial=np.inf)), float(array.max(initial=-np.inf))
+    step = (high - low) / SHORT if high > low else 1.0
+    data = np.ascontiguousarray(np.rint((array - low) / step).astype("<u2"))
+    text = base64.b64encode(data.tobytes()).decode()
+    return {"type": "u2", "shape": list(array.shape), "low": low, "step": step, "data": text}
+
+
 def write_html(file: str | Path, title: str, body: str, data: Mapping[str, Any], programs: Sequence[str]) -> Path:
-    """Write a page; returns its path.
+    """Write a page that stands alone.
 
     Parameters
     ----------
-    file : where to write it
-    title : of the page, plain text
-    body : HTML between header and programs, with every name in it escaped
-    data : what the programs read; anything that JSON can hold
-    programs : names of JavaScript files in contactopt/figures/pages, run in this order once plotly is there
+    file
+        Where to write it.
+    title
+        Of the page, plain text.
+    body
+        HTML between header and programs, with every name in it escaped.
+    data
+        What the programs read; anything that JSON can hold.
+    programs
+        Names of JavaScript files in contactopt/figures/pages, run in this order once plotly is there.
+
+    Returns
+    -------
+    Path
+        The file.
 
     Raises
     ------
-    InputError : if plotly is not installed, or the file cannot be written
+    InputError
+        If plotly is not installed, or the file cannot be written.
     """
     check_installed()
     from plotly.offline import get_plotlyjs

@@ -7,12 +7,28 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.half_spaces import surface_maps
+from contactopt.figures.style import BLUE, ORANGE
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution
 
+COLUMNS = 2  # of panels: more could not be read where the figure is 400 pixels wide
+
 
 def maps_figure(reduction: Reduction, solution: Solution) -> Any:
-    """Pressure, gap, and where there is friction size of traction, size of slip and stick; a Figure."""
+    """Draw maps of pressure and gap, and where there is friction of traction, slip and stick.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of a scene with a half-space.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
+    """
     from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
 
@@ -26,26 +42,34 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
     if problem.law.rough.any():
         traction, slip = (np.linalg.norm(maps[name], axis=-1) for name in ("traction", "slip"))
         panels.append(("traction", np.where(closed, traction, np.nan), f"tangential traction [{stress}]", "viridis"))
-        panels.append(("slip", np.where(closed, slip, np.nan), f"tangential displacement [{length}]", "magma"))
+        panels.append(("slip", np.where(closed, slip, np.nan), f"tangential displacement [{length}]", "cividis"))
         panels.append(
             (
                 "status",
                 np.where(closed, maps["status"], np.nan),
                 "1 stick, 2 slip",
-                ListedColormap(["#1f77b4", "#ff7f0e"]),
+                ListedColormap([BLUE, ORANGE]),
             )
         )
-    if maps["pressure"].ndim == 1:
-        figure = Figure(figsize=(4.2 * len(panels), 3.4), layout="constrained")
-        for (name, values, label, _), ax in zip(panels, figure.subplots(1, len(panels))):
+    line = maps["pressure"].ndim == 1
+    columns = min(COLUMNS, len(panels))
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(3.6 * columns, (2.8 if line else 4.0) * rows), layout="constrained")
+    axes = np.ravel(figure.subplots(rows, columns))
+    for (name, values, label, colours), ax in zip(panels, axes):
+        ax.set_title(name)
+        if line:
             ax.plot(problem.chart.places[0], values)
-            ax.set(xlabel=f"{scene.components[0]} [{length}]", ylabel=label, title=name)
-        return figure
-    x, y = problem.chart.places
-    extent = (x.min(), x.max(), y.min(), y.max())
-    figure = Figure(figsize=(4.4 * len(panels), 3.8), layout="constrained")
-    for (name, values, label, colours), ax in zip(panels, figure.subplots(1, len(panels))):
+            ax.set(xlabel=f"{scene.components[0]} [{length}]", ylabel=label)
+            continue
+        x, y = problem.chart.places
+        extent = (x.min(), x.max(), y.min(), y.max())
         image = ax.imshow(values.T, origin="lower", extent=extent, cmap=colours, interpolation="nearest")
-        ax.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]", title=name)
-        figure.colorbar(image, ax=ax, label=label, shrink=0.85)
+        ax.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]")
+        bar = figure.colorbar(image, ax=ax, label=label, orientation="horizontal")
+        if name == "status":
+            image.set_clim(0.5, 2.5)
+            bar.set_ticks([1, 2])
+    for ax in axes[len(panels) :]:
+        ax.set_axis_off()
     return figure

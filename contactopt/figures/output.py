@@ -17,23 +17,49 @@ from contactopt.problem import alone, part_of
 from contactopt.scenes.scene import HalfSpace
 
 if TYPE_CHECKING:
+    from contactopt.analysis.paths import PathResult
+    from contactopt.interface.recovery import Fields
     from contactopt.runner import Result
 
 PAGE = "view.html"
-PICTURES = ("deformed", "maps", "pressure", "path")
+PICTURES = ("deformed", "maps", "pressure", "path", "refinement")
+STATES = "states.npz"
+MOST_NUMBERS = 3_000_000  # of the bodies at all states of a load path, above which only the last state is written
 # What a run writes beside summary.json and one VTU file per body.
 RUN_FILES = (
     *(f"{name}.{ending}" for name in PICTURES for ending in FORMATS),
-    PAGE, "interface.npz", "history.csv", "path.npz",
+    PAGE, "interface.npz", "history.csv", "path.npz", STATES,
 )  # fmt: skip
 
 
 def squeeze(t: np.ndarray) -> np.ndarray:
+    """Drop the second axis of an array (k, d) where d is one, as in 2D.
+
+    Parameters
+    ----------
+    t
+        (k, d) tangential components.
+
+    Returns
+    -------
+    ndarray
+        (k,) or (k, d).
+    """
     return t[:, 0] if t.shape[1] == 1 else t
 
 
 def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
-    """The figures of a result in each of the formats: bodies, pressure and traction of every pair, maps, load path."""
+    """Draw the figures of a result: bodies, pressure and traction of every pair, maps, load path.
+
+    Parameters
+    ----------
+    result
+        The solved scene.
+    folder
+        Where the files go.
+    formats
+        Endings of the files, each figure in every one of them.
+    """
     from contactopt.figures import plots
 
     def save(figure: Any, name: str) -> None:
@@ -55,10 +81,26 @@ def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
         from contactopt.figures.animation import path_figure
 
         save(path_figure(result.path), "path")
+    if result.estimate is not None:
+        from contactopt.adaptivity.loop import AdaptedEstimate
+        from contactopt.figures.refinement import refinement_figure
+
+        if isinstance(result.estimate, AdaptedEstimate):
+            save(refinement_figure(result.estimate), "refinement")
 
 
-def write(result: Result, folder: Path) -> None:
-    """The fields of a result as VTU files, its contact forces and its load path as arrays."""
+def write(result: Result, folder: Path, states: bool) -> None:
+    """Write the fields of a result as VTU files, its contact forces and its load path as arrays.
+
+    Parameters
+    ----------
+    result
+        The solved scene.
+    folder
+        Where the files go.
+    states
+        Whether to write the bodies at all states of the path, too, for a page on which they move.
+    """
     surfaces = contact_fields(result.reduction, result.solution)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
         fields.write_vtu(folder / f"{fields.name}.vtu")
@@ -83,13 +125,41 @@ def write(result: Result, folder: Path) -> None:
     )
     if result.path is not None:
         result.path.write(folder)
+        if states and (found := body_states(result.path, result.fields)):
+            np.savez(folder / STATES, **found)
+
+
+def body_states(path: PathResult, last: tuple[Fields, ...]) -> dict[str, Any]:
+    """The bodies at the n states of a path, by "QUANTITY/BODY": displacement (n, nodes, dim) and von_mises (n, nodes).
+
+    It is empty where there would be more than MOST_NUMBERS, or where the path kept no displacements.
+    """
+    numbers = len(path.states) * sum(own.displacement.size + own.von_mises.size for own in last)
+    if not path.states[-1].bodies or not 0 < numbers <= MOST_NUMBERS:
+        return {}
+    made = {}
+    for own in zip(*(path.fields(step) for step in range(len(path.states)))):
+        made[f"displacement/{own[0].name}"] = np.array([f.displacement.T for f in own], dtype=np.float32)
+        made[f"von_mises/{own[0].name}"] = np.array([f.von_mises for f in own], dtype=np.float32)
+    return made
 
 
 def earlier_files(folder: Path) -> set[str]:
-    """Names of the files that an earlier `contactopt run` wrote into the folder; empty where none has run.
+    """List the files that an earlier `contactopt run` wrote into a folder.
 
-    A folder in which one has run holds its summary.json. Its other files have fixed names, but for a VTU file per body and
-    per pair of surfaces, told from other people's by the fields in them, and pictures of the pairs that the summary names.
+    A folder in which one has run holds its summary.json. Its other files have fixed names, but for a VTU file per body
+    and per pair of surfaces, told from other people's by the fields in them, and pictures of the pairs that the summary
+    names.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+
+    Returns
+    -------
+    set
+        Names of files; empty where none has run.
     """
     with suppress(OSError, ValueError, TypeError):
         summary = json.loads(_plain_text(folder / "summary.json"))

@@ -30,9 +30,20 @@ CENTRED = 0.1  # a contact zone whose centre is off the origin by less than this
 
 
 def contact_line(problem: InterfaceProblem) -> np.ndarray:
-    """Contacts along the first direction of the surface, in order; in 3D those of the row nearest to its origin.
+    """Choose the contacts along the first direction of the surface, in order; in 3D those of the row nearest to its
+    origin.
 
     A closed line is cut opposite to its origin, so that its places grow from -period / 2 to period / 2.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of one pair of surfaces.
+
+    Returns
+    -------
+    ndarray
+        (j,) numbers of contacts.
     """
     x = problem.chart.places
     row = np.ones(x.shape[1], dtype=bool)
@@ -44,7 +55,18 @@ def contact_line(problem: InterfaceProblem) -> np.ndarray:
 
 
 def contact_place(problem: InterfaceProblem) -> np.ndarray:
-    """Places (k,) along the first direction of the surface, of a closed line from its origin either way [length]."""
+    """Compute places along the first direction of the surface; of a closed line from its origin either way.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of one pair of surfaces.
+
+    Returns
+    -------
+    ndarray
+        (k,) places [length].
+    """
     x, period = problem.chart.places[0], problem.chart.period
     return x if period is None else np.asarray((x + period / 2) % period - period / 2)
 
@@ -95,7 +117,7 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
         ylabel=f"p / mean p [-], mean p = {mean:.4g} {scene.units[1]}",
         ylim=(0, 5.0 if singular(scene) else 1.15 * float((p / mean).max() or 1.0)),
     )
-    ax.legend(frameon=False)
+    ax.legend(edgecolor="none")
     return ax
 
 
@@ -141,9 +163,10 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
         ax.plot(x[slipping], t[slipping], "s", color=ORANGE, ms=5, mfc="white", label="slip")
     name, where = _place_label(scene, problem), ", y = 0" if problem.dim == 3 else ""
     ax.set(
-        xlabel=f"{name} [{scene.units[0]}]{where}", ylabel=f"tangential traction on the upper body [{scene.units[1]}]"
+        xlabel=f"{name} [{scene.units[0]}]{where}",
+        ylabel=f"tangential traction\non the upper body [{scene.units[1]}]",
     )
-    ax.legend(frameon=False)
+    ax.legend(edgecolor="none")
     return ax
 
 
@@ -191,15 +214,30 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
 
 
 def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) -> Any:
-    """Pressure and tangential traction side by side, with the map of stick and slip in 3D; a Figure."""
+    """Draw pressure above tangential traction, with the map of stick and slip in 3D.
+
+    One panel stands above the other, so that all of them can be read where the figure is 400 pixels wide.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    problem, solution
+        The interface problem of one pair of surfaces, and its solution.
+
+    Returns
+    -------
+    Figure
+        The figure of matplotlib.
+    """
     from matplotlib.figure import Figure
 
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
     # Two plain panels have fixed places, because working out places takes as long as drawing.
-    figure = Figure(figsize=(5.4 * len(panels), 4.2), layout="constrained" if problem.dim == 3 else None)
+    figure = Figure(figsize=(5.6, 3.6 * len(panels)), layout="constrained" if problem.dim == 3 else None)
     if problem.dim == 2:
-        figure.subplots_adjust(left=0.065, right=0.985, bottom=0.13, top=0.91, wspace=0.23)
-    for draw, ax in zip(panels, figure.subplots(1, len(panels))):
+        figure.subplots_adjust(left=0.19, right=0.97, bottom=0.07, top=0.94, hspace=0.24)
+    for draw, ax in zip(panels, figure.subplots(len(panels), 1)):
         draw(scene, problem, solution, ax)
     figure.suptitle(f"{scene.name}, {scene.friction}: {solution.status}, residual {solution.residual:.1e}")
     return figure
@@ -217,7 +255,20 @@ def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
 
 
 def fit(found: Fit, ax: Any = None) -> Any:
-    """What the model leaves of the data, over the standard deviation of the noise, state by state."""
+    """Draw what the model leaves of the data, over the standard deviation of the noise, state by state.
+
+    Parameters
+    ----------
+    found
+        The parameters that were fitted.
+    ax
+        Axes to draw on; by default new ones.
+
+    Returns
+    -------
+    Axes
+        The axes.
+    """
     ax = make_axes(ax)
     for (name, measured), colour in zip(found.data.items(), (BLUE, ORANGE, GREEN, GREY)):
         rest = (measured - found.model[name]) / (found.noise[name] or 1.0)
@@ -231,7 +282,20 @@ def fit(found: Fit, ax: Any = None) -> Any:
 
 
 def design(found: Design, ax: Any = None) -> Any:
-    """The pressure of the designed contact over the place along the surface, and its mean."""
+    """Draw the pressure of the designed contact over the place along the surface, and its mean.
+
+    Parameters
+    ----------
+    found
+        The design.
+    ax
+        Axes to draw on; by default new ones.
+
+    Returns
+    -------
+    Axes
+        The axes.
+    """
     ax = make_axes(ax)
     problem = found.reduction.problem
     place = problem.chart.places[0]

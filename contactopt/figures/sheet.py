@@ -19,16 +19,24 @@ MARKS = "#*o+x%@&"
 
 
 def describe(name: str, changes: dict[str, Any]) -> str:
-    """The sheet of a named scene, or of a scene file.
+    """Write the sheet of a named scene, or of a scene file.
 
     Parameters
     ----------
-    name : a key of contactopt.scenes.SCENES, or a file that ends in .toml
-    changes : other values of the arguments of a named scene
+    name
+        A key of contactopt.scenes.SCENES, or a file that ends in .toml.
+    changes
+        Other values of the arguments of a named scene.
+
+    Returns
+    -------
+    str
+        The text.
 
     Raises
     ------
-    InputError : for an unknown scene or argument, and for a scene file with a mistake
+    InputError
+        For an unknown scene or argument, and for a scene file with a mistake.
     """
     if name.endswith(".toml"):
         from contactopt.scenes.scene_files import read_scene_file

@@ -14,7 +14,20 @@ ARROWS = 1000  # about as many arrows as a map of tractions can show
 
 
 def make_axes(ax: Any, **options: Any) -> Any:
-    """The axes that were given, or those of a new figure."""
+    """Give the axes that were given, or those of a new figure.
+
+    Parameters
+    ----------
+    ax
+        Axes, or None.
+    options
+        Of the new axes, as for `add_subplot`.
+
+    Returns
+    -------
+    Axes
+        The axes.
+    """
     if ax is not None:
         return ax
     from matplotlib.figure import Figure
@@ -26,6 +39,13 @@ def save_figure(figure: Any, path: Path) -> None:
     """Write a figure to a file, whose ending says the format.
 
     A PNG is drawn once. Figure.savefig would draw it twice, the first time only to learn its size.
+
+    Parameters
+    ----------
+    figure
+        The figure.
+    path
+        The file.
     """
     if path.suffix != ".png":
         figure.savefig(path, dpi=DPI)
@@ -38,5 +58,16 @@ def save_figure(figure: Any, path: Path) -> None:
 
 
 def singular(scene: Scene) -> bool:
-    """Whether tractions are known to be infinite somewhere, so that the largest nodal value means nothing."""
+    """Say whether tractions are known to be infinite somewhere, so that the largest nodal value means nothing.
+
+    Parameters
+    ----------
+    scene
+        The scene, with its exact solution if one is known.
+
+    Returns
+    -------
+    bool
+        True where the exact solution has no largest value.
+    """
     return scene.reference is not None and scene.reference.peak is None

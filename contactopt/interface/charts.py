@@ -51,24 +51,43 @@ class SymmetryPlane:
     offset: float
 
     def contains(self, points: np.ndarray, size: float) -> np.ndarray:
-        """Mask of the points (dim, k) that lie in the plane."""
+        """Tell which points lie in the plane.
+
+        Parameters
+        ----------
+        points
+            (dim, k) points [length].
+        size
+            The size of the contact surface, beside which rounding is zero [length].
+
+        Returns
+        -------
+        ndarray
+            (k,) mask.
+        """
         return np.asarray(np.abs(self.inward @ points - self.offset) <= NEAR * size)
 
 
 def lay_out(contacts: ContactPoints, copies: int, axisymmetric: bool) -> tuple[Chart, np.ndarray, np.ndarray]:
-    """Chart and frames (k, dim, dim) of the contacts in their new order, and this order (k,).
+    """Lay out the chart and the local frames of a contact surface.
 
-    Contacts are ordered along the contact line, or row by row of the tangent chart. In 2D t1 is n turned clockwise. In 3D
-    it is the first direction of the chart, made orthogonal to n.
+    Contacts are ordered along the contact line, or row by row of the tangent chart. In 2D t1 is n turned clockwise. In
+    3D it is the first direction of the chart, made orthogonal to n.
 
     Parameters
     ----------
     contacts
-        The contacts in any order.
+        The k contacts in any order.
     copies
-        Number of mirror images that make the whole bodies: a plane of symmetry mirrors the chart if there is more than one.
+        Number of mirror images that make the whole bodies: a plane of symmetry mirrors the chart if there is more than
+        one.
     axisymmetric
         Whether the first coordinate is the distance from an axis.
+
+    Returns
+    -------
+    tuple
+        The chart and the frames (k, dim, dim) of the contacts in their new order, and this order (k,).
     """
     planes = symmetry_planes(contacts)
     mirrors = copies > 1
@@ -98,7 +117,18 @@ def _clockwise(normals: np.ndarray) -> np.ndarray:
 
 
 def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
-    """The planes across one component on which exactly the tangential displacement along it is held."""
+    """Find the planes across one component on which exactly the tangential displacement along it is held.
+
+    Parameters
+    ----------
+    contacts
+        The contacts with their normals and held components.
+
+    Returns
+    -------
+    list
+        The planes, at most one for each component.
+    """
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
     for c, mask in enumerate(held):
         if not mask.any():
@@ -117,9 +147,19 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
 
 
 def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
-    """The normals (dim, k); at planes of symmetry they lie in the plane.
+    """Put the normals at planes of symmetry into these planes.
 
     The mean over the facets that are modelled leaves out their mirror images, and so is tilted on a curved surface.
+
+    Parameters
+    ----------
+    contacts
+        The k contacts.
+
+    Returns
+    -------
+    ndarray
+        (dim, k) unit normals.
     """
     normals = contacts.normals
     for plane in symmetry_planes(contacts):

@@ -23,10 +23,24 @@ COSTS: dict[tuple[int, str], tuple[float, ...]] = {
 
 
 def terms(way: str, m: int, n: int, dim: int) -> np.ndarray:
-    """What the cost of a way grows with (4,), for n unknowns of the largest body, m of them on its contact surface.
+    """Compute what the cost of a way grows with.
 
-    Assembly grows with n, and so does the coupled way with its V-cycles. Factors take n^1.5 operations in the plane and n^2 in
-    space, a dense Q m^3, and products with Q n log2 n or n^(4/3) (nested dissection).
+    Assembly grows with n, and so does the coupled way with its V-cycles. Factors take n^1.5 operations in the plane and
+    n^2 in space, a dense Q m^3, and products with Q n log2 n or n^(4/3) (nested dissection).
+
+    Parameters
+    ----------
+    way
+        A name in WAYS.
+    m, n
+        Number of unknowns on the contact surface, and of all unknowns of the largest body.
+    dim
+        Dimension of space, 2 or 3.
+
+    Returns
+    -------
+    ndarray
+        (4,) terms, to which COSTS gives the seconds.
     """
     factors = n ** (1.5 if dim == 2 else 2.0)
     substitution = n * np.log2(max(n, 2)) if dim == 2 else n ** (4 / 3)
@@ -35,12 +49,25 @@ def terms(way: str, m: int, n: int, dim: int) -> np.ndarray:
 
 
 def seconds(way: str, m: int, n: int, dim: int, solver: str) -> float:
-    """The estimated time of set-up and solution on one core."""
+    """Estimate the time of set-up and solution on one core.
+
+    Parameters
+    ----------
+    way, m, n, dim
+        As for `terms`.
+    solver
+        Name of the solver of the bodies with factors.
+
+    Returns
+    -------
+    float
+        The time [s].
+    """
     return float(np.dot(COSTS[dim, solver], terms(way, m, n, dim)))
 
 
 def form_of(m: int, n: int, dim: int, iterative: bool, solver: str = "superlu") -> str:
-    """The cheaper form of Q, 'explicit' or 'implicit'.
+    """Choose the cheaper form of Q.
 
     Bodies without factors would need m solves for an explicit Q, which never pays.
 
@@ -55,7 +82,12 @@ def form_of(m: int, n: int, dim: int, iterative: bool, solver: str = "superlu") 
     iterative
         Whether a body has no factors.
     solver
-        Of the bodies with factors.
+        Name of the solver of the bodies with factors.
+
+    Returns
+    -------
+    str
+        'explicit' or 'implicit'.
     """
     if iterative or m > MOST_EXPLICIT:
         return "implicit"

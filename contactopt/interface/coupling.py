@@ -77,7 +77,7 @@ class Coupling:
 def couple(
     scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody, kind: str | None = None
 ) -> Coupling:
-    """The coupling of a pair of surfaces of two assembled bodies.
+    """Make the coupling of a pair of surfaces of two assembled bodies.
 
     Parameters
     ----------
@@ -86,8 +86,13 @@ def couple(
     upper, lower
         Its bodies.
     kind
-        A name in COUPLINGS, or 'auto'; by default that of the pair. 'auto' is matching nodes where they match, or where a
-        body has no mesh, and otherwise mortar.
+        A name in COUPLINGS, or 'auto'; by default that of the pair. 'auto' is matching nodes where they match, or where
+        a body has no mesh, and otherwise mortar.
+
+    Returns
+    -------
+    Coupling
+        The contacts with their frames, gaps and areas, and the maps from the bodies' displacements to theirs.
 
     Raises
     ------
@@ -117,14 +122,42 @@ def _kind(name: str) -> Callable[[Scene, Contact, AssembledBody, AssembledBody],
 
 
 def renumbered(cells: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """Cells (v, c) in terms of contacts that were put in another order (k,)."""
+    """Write cells in terms of contacts that were put in another order.
+
+    Parameters
+    ----------
+    cells
+        (v, c) contacts at the corners of each cell.
+    order
+        (k,) the old numbers of the contacts in their new order.
+
+    Returns
+    -------
+    ndarray
+        (v, c) the same cells in new numbers.
+    """
     place = np.empty(len(order), dtype=int)
     place[order] = np.arange(len(order))
     return place[cells]
 
 
 def local_map(surface: Surface, contacts: np.ndarray, frames: np.ndarray) -> sp.csr_matrix:
-    """T (k dim, n): the body's unknowns -> the displacement of some of its contacts (k,) in the frames (k, dim, dim)."""
+    """Make the map from a body's unknowns to the displacement of some of its contacts in their frames.
+
+    Parameters
+    ----------
+    surface
+        The contact surface of the body, which has n unknowns.
+    contacts
+        (k,) numbers of contacts on this surface.
+    frames
+        (k, dim, dim) unit vectors n, t1[, t2] of each contact, as rows.
+
+    Returns
+    -------
+    csr_matrix
+        T (k dim, n), with dim rows for each contact, normal first.
+    """
     k, dim = frames.shape[:2]
     if all(trace.nnz == trace.shape[0] and np.all(np.diff(trace.indptr) == 1) for trace in surface.traces):
         return _from_single_unknowns(surface, contacts, frames)

@@ -46,8 +46,25 @@ class Integrals:
 
 
 def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
-    """Contacts on the own side and their integrals over the points of the overlap, at least one."""
+    """Integrate the dual functions of one surface over its overlap with another.
+
+    Parameters
+    ----------
+    own
+        The side that carries the contacts, with n points.
+    other
+        The other side, with n' points.
+    points
+        The points of integration of the overlap, at least one.
+
+    Returns
+    -------
+    Integrals
+        The contacts on the own side: nodes (k,), areas (k,), the sparse weights W (k, n) and W' (k, n') whose rows add
+        up to one, and the distances between the surfaces.
+    """
     count = own.cells.shape[1]
+    # The cells that the other side covers at all, and the face and the place in it of each.
     used, cell = np.unique(points.cell, return_inverse=True)
     face, local = used // len(own.cells), used % len(own.cells)
 
@@ -56,26 +73,32 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
     def summed(values: np.ndarray) -> np.ndarray:
         return np.add.reduceat(values, first, axis=1).T
 
+    # Per cell: a_v = int phi_v, the mean of every hat function, and the matrix int (phi_v - mean) (phi_w - mean).
     phi = own.hats(points.cell % len(own.cells), points.at)
     area = summed(phi * points.measure)  # (cell, v)
     whole = area.sum(axis=1)
     mean = area / whole[:, None]
     centred = phi - mean[cell].T
     mass = summed((centred[:, None] * centred * points.measure).reshape(count * count, -1)).reshape(-1, count, count)
+    # The best linear fit of f at vertex v is the mean of f plus its slopes, fit (v, w) int centred_w f.
     fit = _slopes(mass, area, whole)  # value at vertex v less the mean = fit (v, w) int centred_w f
 
     def functional(values: np.ndarray, block: slice) -> np.ndarray:
         """(pair, v, j) int psi_v f_j over the points of a block, summed for every pair of a cell and a face."""
         c = cell[block]
+        # psi_v = a_v (1 / whole + fit centred) on the cell, times the measure of every point.
         dual = area[c].T * (1 / whole[c] + np.einsum("gvw,wg->vg", fit[c], centred[:, block]))
         weighted = dual * points.measure[block]
         return np.stack([np.add.reduceat(w * values, pairs, axis=1).T for w in weighted], axis=1)
 
+    # Vertices of cells become contacts; those that are hardly covered pass their share on.
     nodes, rows = np.unique(own.faces[face[:, None], own.cells[local]], return_inverse=True)
     rows = _pass_on(rows.reshape(area.shape), area, whole)
     strong, rows = np.unique(rows, return_inverse=True)
     nodes, rows = nodes[strong], rows.reshape(area.shape)
     areas = np.bincount(rows.ravel(), area.ravel(), len(nodes))
+    # Sum int psi_i N_j over blocks of points, so that memory stays bounded: W of the own side, W' of the other, and
+    # the mean vector x - x' between the true places on both surfaces.
     W = sp.csr_matrix((len(nodes), own.points.shape[1]))
     W_other = sp.csr_matrix((len(nodes), other.points.shape[1]))
     apart = np.zeros((own.dim, len(nodes)))
@@ -103,6 +126,7 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
                     )
                     W_other = W_other + term @ rounding.rises
             places.append(surface.true(surface.locations(faces[block], at[:, block])[0]))
+        # The deepest overlap of the surfaces, for a message.
         distance = -np.sum((places[0] - places[1]) * _unit_normals(own, points, block), axis=0)
         if distance.min() < least:
             least, deepest = float(distance.min()), places[0][:, np.argmin(distance)]
@@ -145,13 +169,41 @@ def _slopes(mass: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray
 
 
 def collect(values: np.ndarray, row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> sp.csr_matrix:
-    """Sparse matrix of values (pair, v, j) in rows (pair, v) and columns (pair, j)."""
+    """Sum values into a sparse matrix.
+
+    Parameters
+    ----------
+    values
+        (pair, v, j) values.
+    row
+        (pair, v) rows.
+    column
+        (pair, j) columns.
+    shape
+        Of the matrix.
+
+    Returns
+    -------
+    csr_matrix
+        The matrix. Values at the same place are added.
+    """
     rows, columns = np.broadcast_arrays(row[:, :, None], column[:, None, :])
     return sp.csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape)
 
 
 def tidy(W: sp.csr_matrix) -> sp.csr_matrix:
-    """Rounding made zero, and rows made to add up to one exactly, whatever the condition of a sliver."""
+    """Make the rounding in weights zero, and let every row add up to one exactly, whatever the condition of a sliver.
+
+    Parameters
+    ----------
+    W
+        (k, n) weights.
+
+    Returns
+    -------
+    csr_matrix
+        The same weights but for rounding.
+    """
     W = sp.csr_matrix(W)
     W.data[np.abs(W.data) < 1e-14] = 0.0
     W.eliminate_zeros()

@@ -12,7 +12,7 @@ from contactopt.problem.coupled import BodyTerm, CoupledForm
 
 
 def coupled_form(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> CoupledForm:
-    """Q by the equilibrium of the iterative bodies, all at once, and by products with the others.
+    """Make Q from the equilibrium of the iterative bodies, all at once, and from products with the others.
 
     Parameters
     ----------
@@ -20,6 +20,11 @@ def coupled_form(bodies: Sequence[Body], maps: Sequence[sp.csr_matrix]) -> Coupl
         All bodies, at least one of them with an `equilibrium`.
     maps
         Their signed maps B (k dim, n), as in contactopt.interface.reduction.
+
+    Returns
+    -------
+    CoupledForm
+        Q before condensation.
     """
     terms: list[BodyTerm] = []
     others = []

@@ -157,7 +157,20 @@ def _solve(A: list[list[np.ndarray]], b: list[np.ndarray]) -> np.ndarray:
 
 
 def evaluate(element: skfem.Element, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions (j, m) and their derivatives (j, dim - 1, m) at reference coordinates (dim - 1, m)."""
+    """Evaluate the shape functions of an element and their derivatives.
+
+    Parameters
+    ----------
+    element
+        A scikit-fem element with j shape functions.
+    at
+        (dim - 1, m) reference coordinates.
+
+    Returns
+    -------
+    tuple
+        Values (j, m) and derivatives (j, dim - 1, m).
+    """
     values = [element.lbasis(at, j) for j in range(len(element.doflocs))]
     value = np.stack([np.broadcast_to(v, at.shape[1:]) for v, _ in values])
     return value, np.stack([np.broadcast_to(np.asarray(s).reshape(len(at), -1), at.shape) for _, s in values])
@@ -173,20 +186,41 @@ def faces_of(
     points: np.ndarray,
     curve: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Faces:
-    """The faces that make up the surface of a body.
+    """Collect the faces that make up the surface of a body.
 
     Parameters
     ----------
-    nodes    (f, j) nodes of every face, as `faces` in Faces
-    outward  (dim, f) a vector for every face that points out of the body
-    name, kind, degree, weight, points, curve  as in Faces
+    name, kind, degree
+        As in Faces.
+    nodes
+        (f, j) nodes of every face, as `faces` in Faces.
+    outward
+        (dim, f) a vector for every face that points out of the body.
+    weight, points, curve
+        As in Faces.
+
+    Returns
+    -------
+    Faces
+        The surface, with the sign of each face that makes its normal point outward.
     """
     made = Faces(name, kind, degree, points, nodes, np.ones(len(nodes)), weight, curve)
     return replace(made, turn=np.sign(np.sum(face_normals(made) * outward, axis=0)))
 
 
 def face_normals(surface: Faces) -> np.ndarray:
-    """(dim, f) unit normals at the middle of every face, outward."""
+    """Compute the outward unit normals at the middle of every face.
+
+    Parameters
+    ----------
+    surface
+        A surface of f faces.
+
+    Returns
+    -------
+    ndarray
+        (dim, f) normals.
+    """
     middle = surface.places[:, : surface.corners].mean(axis=1)
     count = len(surface.faces)
     tangents = surface.locations(np.arange(count), np.repeat(middle[:, None], count, axis=1))[1]
@@ -195,16 +229,39 @@ def face_normals(surface: Faces) -> np.ndarray:
 
 
 def cross(tangents: np.ndarray) -> np.ndarray:
-    """Normals (dim, m), as long as the surface is stretched, of tangents (dim, dim - 1, m)."""
+    """Compute normals from tangents: in 3D their cross product, in 2D the tangent turned clockwise.
+
+    Parameters
+    ----------
+    tangents
+        (dim, dim - 1, m) derivatives of the places by the reference coordinates.
+
+    Returns
+    -------
+    ndarray
+        (dim, m) normals, as long as the surface is stretched.
+    """
     if len(tangents) == 2:
         return np.stack([tangents[1, 0], -tangents[0, 0]])
     return np.cross(tangents[:, 0], tangents[:, 1], axis=0)
 
 
 def patches(surface: Faces, own: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Polygons that stand for a face when surfaces are cut: their vertices among its nodes (p, v), their cell (p,).
+    """Choose the polygons that stand for a face when surfaces are cut.
 
     Those of the side with the multipliers never reach over two of its cells.
+
+    Parameters
+    ----------
+    surface
+        The surface.
+    own
+        Whether this side carries the multipliers.
+
+    Returns
+    -------
+    tuple
+        The vertices (p, v) of each polygon among the nodes of a face, and the cell (p,) in which it lies.
     """
     if surface.curved and surface.kind == "RefTet":
         return _QUARTERS, np.zeros(4, dtype=int)

@@ -63,6 +63,7 @@ class Rounding:
 def _rises(surface: Faces, edges: np.ndarray) -> sp.csr_matrix:
     """(f e, n) from the nodes' values to m_e; zero where the gradient at an end of an edge is unknown."""
     gradients = _gradients(surface)
+    # m_e = (grad_a - grad_b) . (x_b - x_a) / 8 as a matrix on the nodes' values; unknown gradients give no rise.
     a, b = (surface.faces[:, edges[:, i]].ravel() for i in (0, 1))
     along = (surface.points[:, b] - surface.points[:, a]) / 8
     determined = np.asarray(sum(np.diff(G.indptr) for G in gradients) > 0)
@@ -100,12 +101,14 @@ def _fit(apart: np.ndarray, directions: int, terms: int) -> np.ndarray | None:
     """(dim, m) weights of m nodes in the gradient of the quadratic fit where `apart` (dim, m) is zero; None: undetermined."""
     if apart.shape[1] < terms:
         return None
+    # Coordinates y in the tangent plane through the nodes, scaled to one.
     axes = np.linalg.svd(apart - apart.mean(axis=1, keepdims=True), full_matrices=False)[0][:, :directions]
     y = axes.T @ apart
     size = np.abs(y).max()
     if size == 0:
         return None
     y = y / size
+    # Least squares for 1, y and the products y_i y_k; rows 1 to `directions` of the pseudo-inverse give the gradient.
     squares = [y[i] * y[k] for i in range(directions) for k in range(i, directions)]
     A = np.stack([np.ones(len(y.T)), *y, *squares], axis=1)
     U, s, Vt = np.linalg.svd(A, full_matrices=False)

@@ -12,14 +12,24 @@ ROUNDING = 1e-11  # shorter levers, over the size of faces, are rounding
 
 
 def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """The levers l_i (dim, k) [length]: the part of e_i that is no gap, and a share of the gap.
+    """Compute the levers l_i by which displacements are carried: the part of e_i that is no gap, and a share of the
+    gap.
 
     Parameters
     ----------
-    e      (dim, k) vectors from where forces act on the other side to where they act on the own side [length]
-    up     (dim, k) unit normals along which e opens the gap
-    gap    (k,) initial gap [length]
-    sizes  (k,) sizes of the contacts' cells [length]
+    e
+        (dim, k) vectors from where forces act on the other side to where they act on the own side [length].
+    up
+        (dim, k) unit normals along which e opens the gap.
+    gap
+        (k,) initial gap [length].
+    sizes
+        (k,) sizes of the contacts' cells [length].
+
+    Returns
+    -------
+    ndarray
+        (dim, k) levers [length]; zero where they would be rounding alone.
     """
     limit = SHARE * sizes
     lever = e - up * (gap - np.clip(gap, -limit, limit))
@@ -28,11 +38,27 @@ def levers(e: np.ndarray, up: np.ndarray, gap: np.ndarray, sizes: np.ndarray) ->
 
 
 def rotations_times(lever: np.ndarray, own: Faces, nodes: np.ndarray) -> list[list[sp.csr_matrix]]:
-    """Matrices [c][d] (k, n) from displacements d of the own nodes to component c of omega_i x l_i.
+    """Make the matrices from the displacements of a surface to omega_i x l_i at its contacts.
 
-    omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas of the faces. In a plane of
-    symmetry, where the mirror images of these faces count as well, it turns about the normal of the plane alone.
+    omega_i is the mean rotation of the nodes of all faces around contact i, weighted with the areas of the faces. In a
+    plane of symmetry, where the mirror images of these faces count as well, it turns about the normal of the plane
+    alone.
+
+    Parameters
+    ----------
+    lever
+        (dim, k) levers l_i [length].
+    own
+        The surface, with n points.
+    nodes
+        (k,) its points that are contacts.
+
+    Returns
+    -------
+    list
+        Matrices [c][d] (k, n) from the component d of the displacement to the component c of the product.
     """
+    # Weight of node j around contact i: the sizes of the faces that hold both, summed.
     f, size = len(own.faces), own.points.shape[1]
     corners = own.points[:, own.faces[:, : own.corners]]
     radius = np.linalg.norm(corners - corners.mean(axis=2, keepdims=True), axis=0).max(axis=1)
@@ -54,18 +80,22 @@ def _rotations(
     w = sp.coo_matrix(around)
     active = w.data > 0
     i, j, weight = w.row[active], w.col[active], w.data[active]
+    # rho_j, the places of the nodes from their weighted mean.
     total = np.bincount(i, weight, k)
     centre = np.stack([np.bincount(i, weight * x[j], k) for x in points]) / np.where(total > 0, total, 1.0)
     rho = points[:, j] - centre[:, i]
+    # The matrices rho_j x of the cross products, in space also for plane scenes.
     cross3 = np.zeros((len(i), 3, 3))  # rho x
     full = np.zeros((3, len(i)))
     full[:dim] = rho
     cross3[:, 0, 1], cross3[:, 0, 2], cross3[:, 1, 2] = -full[2], full[1], -full[0]
     cross3 -= cross3.transpose(0, 2, 1)
+    # J = sum_j w_j (rho_j^2 - rho_j rho_j') is the sum of -w_j (rho_j x)^2; axes that do not turn are left out.
     moments = -np.einsum("g,gab,gbc->gac", weight, cross3, cross3)
     J = np.stack([np.bincount(i, m, k) for m in moments.reshape(len(i), 9).T], axis=1).reshape(k, 3, 3)
     J = np.where(about.T[:, :, None] & about.T[:, None, :], J, 0.0)
     inverse = np.linalg.pinv(J, rcond=1e-10, hermitian=True)
+    # omega x l = -l x omega with omega = J^-1 sum_j w_j rho_j x u_j: the product of four factors for every node.
     arm = np.zeros((k, 3, 3))  # -(lever x) = x lever
     tall = np.zeros((3, k))
     tall[:dim] = lever

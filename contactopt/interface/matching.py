@@ -48,7 +48,7 @@ def couple_nodes(scene: Scene, pair: Contact, upper: AssembledBody, lower: Assem
     names = pair.surfaces
     if upper.meshed and lower.meshed:
         first, second = upper.surface(names[0]), lower.surface(names[1])
-        partner = match(first, second)
+        partner = _match(first, second)
         held = first.held[:, partner] & second.held
         normals = normals_in_planes(
             ContactPoints(second.points, second.normals, second.areas, second.cells, held, 0 * second.areas)
@@ -82,7 +82,7 @@ def _laid_out(scene: Scene, lead: Surface, points: ContactPoints) -> tuple[Chart
     return lay_out(points, scene.copies, scene.kind == "axisymmetric")
 
 
-def match(upper: Surface, lower: Surface) -> np.ndarray:
+def _match(upper: Surface, lower: Surface) -> np.ndarray:
     """For every contact of the lower surface (k,) the number of its partner on the upper one.
 
     Partners lie on one normal of the lower surface. If this finds no partners and the lower surface nowhere turns away

@@ -127,16 +127,32 @@ class Mortar:
 
 
 def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
-    """Contacts between two surfaces.
+    """Find the contacts between two surfaces.
 
-    own  'upper' or 'lower': the body that carries the contacts; None: the one with more contacts where they face each other
-    Raises InputError if the surfaces face each other nowhere.
+    Parameters
+    ----------
+    upper, lower
+        The two surfaces.
+    own
+        'upper' or 'lower': the body that carries the contacts; by default the one with more contacts where they face
+        each other.
+
+    Returns
+    -------
+    Mortar
+        The contacts with areas, normals and gaps, and the weights of the displacements of both sides.
+
+    Raises
+    ------
+    InputError
+        If the surfaces face each other nowhere, or `own` has another value.
     """
     if own not in (None, "upper", "lower"):
         raise InputError(f"the side that carries the contacts must be 'upper', 'lower' or None; got {own!r}.")
     pair = (upper, lower)
     first = 0 if own == "upper" else 1
     mine, theirs = pair[first], pair[1 - first]
+    # Where the surfaces face each other, along the normals of the side that carries the contacts.
     normals, sizes = contact_normals(mine)
     points = overlap(mine, theirs, normals)
     if own is None and _contacts(theirs, points.face) > _contacts(mine, points.cell // len(mine.cells)):
@@ -147,13 +163,17 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
             f"the contact boundaries of body '{upper.name}' and body '{lower.name}' face each other nowhere; "
             "check the boundaries' names, the bodies' positions, and which of them is the upper one."
         )
+    # Integrals of the dual functions: areas a_i, weights W and W', and the mean vector x - x' between the sides.
     sums = integrate(mine, theirs, points)
+    # Normals are always those of the lower body: its own at its nodes, or as they are seen from the contacts.
     n = normals[:, sums.nodes] if first == 1 else _seen(theirs, sums.other)
     n = mine.mirrored(n, sums.nodes)
     n = n / np.linalg.norm(n, axis=0)
+    # The gap is the part of the mean vector along the normal, positive where the bodies are apart.
     gap = -sign * np.sum(n * mine.mirrored(sums.apart, sums.nodes), axis=0)
     lever = np.zeros_like(n)
     if not mine.weight[1]:
+        # e_i = W x - W' x', the vector between the places where the two forces of a contact act, and its lever.
         e = sums.own @ mine.points.T - sums.other @ theirs.points.T
         lever = levers(mine.mirrored(e.T, sums.nodes), -sign * n, gap, sizes[sums.nodes])
     carried = rotations_times(lever, mine, sums.nodes) if np.any(lever) else []
@@ -185,7 +205,19 @@ def _contacts(surface: Faces, faces: np.ndarray) -> int:
 
 
 def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
-    """Outward unit normals (dim, n) at contact nodes, from the linear fits on all cells around; sizes (n,) of the cells."""
+    """Compute the outward normals at contact nodes from the linear fits on all cells around them, and the sizes of
+    these cells.
+
+    Parameters
+    ----------
+    surface
+        A surface of n points.
+
+    Returns
+    -------
+    tuple
+        Unit normals (dim, n) and sizes (n,) [length]; both are zero at points that are no contact nodes.
+    """
     n, count = surface.points.shape[1], len(surface.faces)
     total, area = np.zeros(surface.points.shape), np.zeros(n)
     reference, hat = FACES[surface.kind][:2]

@@ -11,7 +11,20 @@ __all__ = ["Fields", "recover"]
 
 
 def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:
-    """Displacement and stress of the elastic bodies of a solved scene, upper body first."""
+    """Compute the displacement and stress of the elastic bodies of a solved scene.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    tuple
+        The Fields of each body that has any, upper body first.
+    """
     displaced = zip(reduction.bodies, reduction.displaced(solution))
     fields = each(lambda pair: pair[0].fields(pair[1]), displaced)
     return tuple(found for found in fields if found is not None)

@@ -124,14 +124,35 @@ class Reduction:
         return sum(body.unknowns for body in self.bodies)
 
     def own_multipliers(self, multipliers: np.ndarray) -> tuple[np.ndarray, ...]:
-        """The multipliers (p,) of the problem, body by body."""
+        """Split the multipliers of the problem body by body.
+
+        Parameters
+        ----------
+        multipliers
+            (p,) multipliers of the problem.
+
+        Returns
+        -------
+        tuple
+            The multipliers (p_b,) of each body.
+        """
         ends = np.cumsum([len(body.resultants) for body in self.bodies])
         return tuple(np.split(multipliers, ends[:-1]))
 
     def displaced(self, solution: Solution) -> tuple[np.ndarray, ...]:
-        """The displacements U (n,) of every body of a solution.
+        """Compute the displacements of every body of a solution.
 
         Bodies whose displacements came with the contact forces are not solved again.
+
+        Parameters
+        ----------
+        solution
+            A solution of the problem.
+
+        Returns
+        -------
+        tuple
+            U (n_b,) of each body [length].
         """
         known = [] if solution.displacements is None else list(solution.displacements.parts)
         free = [known.pop(0) if known and body.equilibrium is not None else None for body in self.bodies]
@@ -144,10 +165,25 @@ class Reduction:
         return each(displaced, parts, [body.parallel for body in self.bodies])
 
     def loaded(self, scene: Scene) -> Reduction:
-        """The same bodies, coupling and Q under the loads of another scene of the same structure.
+        """Put the loads of another scene of the same structure on the same bodies, coupling and Q.
 
-        Values of tractions, body forces, plate forces and support displacements may differ, and mu; nothing else
-        may differ. Raises InputError if meshes, materials or other parts do, or if supports or plates hold other unknowns.
+        Values of tractions, body forces, plate forces and support displacements may differ, and mu; nothing else may
+        differ.
+
+        Parameters
+        ----------
+        scene
+            The other scene.
+
+        Returns
+        -------
+        Reduction
+            The reduction of that scene.
+
+        Raises
+        ------
+        InputError
+            If meshes, materials or other parts differ, or if supports or plates hold other unknowns.
         """
         _check_same(self.scene, scene)
         start = time.perf_counter()

@@ -56,18 +56,45 @@ class Overlap:
 
 
 def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
-    """Overlap of two surfaces; `normals` (dim, n) are those of the own side at its nodes.
+    """Find where two surfaces overlap, with points of integration.
 
-    Raises InputError if the other surface is folded, so that some cell faces two of its layers.
+    Parameters
+    ----------
+    own
+        The side that carries the contacts, with n points.
+    other
+        The other side.
+    normals
+        (dim, n) normals of the own side at its points.
+
+    Returns
+    -------
+    Overlap
+        The points on both surfaces, in the order of the own cells.
+
+    Raises
+    ------
+    InputError
+        If the other surface is folded, so that some cell faces two of its layers.
     """
     return _lines(own, other, normals) if own.dim == 2 else _polygons(own, other)
 
 
 def neighbours(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of balls (centres (dim, n), radii (n,)) of two sets that may face each other.
+    """Find the pairs of balls of two sets that may face each other.
 
-    Balls are apart by at most twice the distance of the nearest ones, so that surfaces with a gap find each other. Those
-    of b are searched by size, each octave in a tree of its own: graded meshes need no more pairs than even ones.
+    Balls are apart by at most twice the distance of the nearest ones, so that surfaces with a gap find each other.
+    Those of b are searched by size, each octave in a tree of its own: graded meshes need no more pairs than even ones.
+
+    Parameters
+    ----------
+    a, b
+        Centres (dim, n) and radii (n,) of the balls of each set [length].
+
+    Returns
+    -------
+    tuple
+        The numbers (j,) of the balls of a and of b in each pair.
     """
     (x, r), (y, s) = a, b
     octave = np.floor(np.log2(s / s.max()))

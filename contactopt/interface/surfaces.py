@@ -45,12 +45,18 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
         If a body has no mesh on its contact surface, or if the surfaces face each other nowhere.
     """
     meshes = [_mesh(body.surface(name)) for body, name in zip((upper, lower), pair.surfaces)]
+    # The contacts, with their weights on both sides.
     sides = _halved([_faces(body.name, mesh) for body, mesh in zip((upper, lower), meshes)], meshes)
     m = mortar(sides[0], sides[1], pair.carrier)
     mine, theirs = meshes[m.own], meshes[1 - m.own]
+    # A component is held at a contact where supports hold it on both sides.
     own_held = mine.held[mine.unknowns[:, m.nodes]]
     other_held = np.stack([m.alone[1 - m.own] @ ~theirs.held[row] == 0 for row in theirs.unknowns])
+    mirror = sides[m.own].mirror
+    if mirror is not None:  # the other side is held as well where a plane of symmetry of both cuts it
+        other_held |= mirror[:, m.nodes]
     cells = _cells(sides[m.own], m.nodes)
+    # Chart and frames, and the maps T from the displacements of both bodies in the order of the chart.
     contacts = ContactPoints(m.points, m.normals, m.areas, cells, own_held & other_held, m.gap)
     chart, frames, order = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
     maps = [_map(m, i, mesh, own_held, frames, order) for i, mesh in enumerate(meshes)]

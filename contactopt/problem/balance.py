@@ -44,10 +44,20 @@ class Escape:
 
 
 def escape(problem: InterfaceProblem) -> Escape | None:
-    """A motion along which the loads drive the bodies away from all contacts; None if none is found.
+    """Look for a motion along which the loads drive the bodies away from all contacts.
 
-    Looked at are laws under which contacts can only push. Under laws whose friction is no cone, only motions count that do
-    not slide where there is friction.
+    Looked at are laws under which contacts can only push. Under laws whose friction is no cone, only motions count that
+    do not slide where there is friction.
+
+    Parameters
+    ----------
+    problem
+        The interface problem, with free bodies or plates (V, s).
+
+    Returns
+    -------
+    Escape or None
+        The motion; None if none is found.
     """
     if not problem.law.unilateral or not np.any(problem.s):
         return None
@@ -151,7 +161,20 @@ def _passes(problem: InterfaceProblem, s: np.ndarray, motion: np.ndarray) -> boo
 
 
 def sentence(problem: InterfaceProblem, found: Escape) -> str:
-    """What a motion without resistance means, for people."""
+    """Say in a sentence what a motion without resistance means.
+
+    Parameters
+    ----------
+    problem
+        The interface problem, whose `motions` name the columns of V.
+    found
+        The motion that `escape` found in it.
+
+    Returns
+    -------
+    str
+        What happens to which body, and what to change.
+    """
     label = problem.motions[found.strongest] if problem.motions else f"column {found.strongest} of V"
     body, _, motion = label.rpartition(": ")
     body = body or "a body"

@@ -108,7 +108,7 @@ def natural_map_residual(
     d = np.asarray(problem.Q @ r.ravel() if moved is None else moved.value).reshape(r.shape)
     w = problem.q + (problem.V @ lam).reshape(r.shape)
     u = d + w
-    measure = yardsticks(problem, r, d, w)
+    measure = _yardsticks(problem, r, d, w)
     errors = np.linalg.norm(r - problem.law.project(r - measure.rho[:, None] * u)[0], axis=1)
     r_n, r_t = split(r)
     beyond = np.linalg.norm(r_t, axis=1) - problem.law.bound(r_n)
@@ -121,7 +121,7 @@ def natural_map_residual(
     return worst if np.isfinite(worst) else np.inf
 
 
-def yardsticks(problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.ndarray) -> Yardsticks:
+def _yardsticks(problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.ndarray) -> Yardsticks:
     """The force F, the length L and the steps rho of the certificate, as in the head of this module.
 
     r (k, dim) are the forces, d = Q r and w = q + V lambda; all finite.
@@ -142,7 +142,7 @@ def yardsticks(problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.nd
     moves = compliance > 0
     shares = np.where(moves, size, 0.0) if np.any(size[moves] > 0) else moves.astype(float)
     mean = float(shares @ compliance / shares.sum()) if shares.any() else 0.0
-    natural = max(length / mean if mean > 0 else 0.0, plate_force(problem))
+    natural = max(length / mean if mean > 0 else 0.0, _plate_force(problem))
     force = max(min(largest, natural), DUST * natural) if natural > 0 else largest
     force = force or 1.0  # no force, and none that would make a displacement: any number serves
     if length == 0:
@@ -151,7 +151,7 @@ def yardsticks(problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.nd
     return Yardsticks(force, length, stiff * (force / length))
 
 
-def plate_force(problem: InterfaceProblem) -> float:
+def _plate_force(problem: InterfaceProblem) -> float:
     """S = max_j |s_j| / max_i |V_ij|, the force on a plate [force]; 0 without a plate."""
     if len(problem.s) == 0:
         return 0.0
@@ -175,9 +175,21 @@ def _least_displacement(r: np.ndarray, u: np.ndarray) -> float:
 
 
 def balance_residual(problem: InterfaceProblem, reactions: np.ndarray, force: float | None = None) -> float:
-    """Largest relative error of V' r + s = 0: |V_j' r + s_j| / max(|s_j|, max_i |V_ij| F) [-].
+    """Compute the largest relative error of the balance V' r + s = 0: |V_j' r + s_j| / max(|s_j|, max_i |V_ij| F).
 
-    force  F; None: the largest |r_i|
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    reactions
+        (k, dim) contact forces, normal first [force].
+    force
+        The yardstick F [force]; by default the largest |r_i|.
+
+    Returns
+    -------
+    float
+        The error [-]. It is 0 without a balance, and infinite where a resultant that must vanish has no yardstick.
     """
     if len(problem.s) == 0:
         return 0.0
@@ -219,9 +231,21 @@ def siconos_residual(problem: InterfaceProblem, reactions: np.ndarray, multiplie
 
 
 def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray:
-    """The lambda (p,) that fits the reactions best: least squares on the components whose displacement must vanish.
+    """Find the multipliers that fit reactions best, by least squares on the components whose displacement must vanish.
 
-    Those are u_n where r_n > 0 and u_t where |r_t| is below the friction bound. With none, zeros.
+    Those are u_n where r_n > 0 and u_t where |r_t| is below the friction bound.
+
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    reactions
+        (k, dim) contact forces, normal first [force].
+
+    Returns
+    -------
+    ndarray
+        (p,) multipliers lambda; zeros where no displacement must vanish.
     """
     if len(problem.s) == 0:
         return np.zeros(0)

@@ -45,11 +45,24 @@ class Chart:
 
     @classmethod
     def of_points(cls, coordinates: np.ndarray, dim: int) -> Chart:
-        """The chart of bare points (d, k), of which nothing else is known: the directions in which they extend most.
+        """Lay a chart through bare points, of which nothing else is known, along the directions in which they extend
+        most.
 
-        Coordinates that are given on the surface already, d = dim - 1, are taken as they are. Otherwise the origin is the
-        middle of the points, the axes are their principal directions, and the sign of each axis is chosen so that its
-        largest component in space is positive.
+        Coordinates that are given on the surface already, d = dim - 1, are taken as they are. Otherwise the origin is
+        the middle of the points, the axes are their principal directions, and the sign of each axis is chosen so that
+        its largest component in space is positive.
+
+        Parameters
+        ----------
+        coordinates
+            (d, k) points [length].
+        dim
+            Number of components of a contact, 2 or 3.
+
+        Returns
+        -------
+        Chart
+            The chart, open and without symmetry.
         """
         count = dim - 1
         if len(coordinates) <= count:
@@ -67,18 +80,40 @@ class Chart:
         return self.period is not None
 
     def order(self) -> np.ndarray:
-        """The contacts (k,) in their order along a contact line; on a surface, along its first direction."""
+        """Sort the contacts along a contact line; on a surface, along its first direction.
+
+        Returns
+        -------
+        ndarray
+            (k,) numbers of the contacts.
+        """
         return np.argsort(self.places[0], kind="stable")
 
     def offsets(self, contact: int) -> np.ndarray:
-        """Places (dim - 1, k) relative to one contact; on a closed line the shorter way round [length]."""
+        """Compute places relative to one contact; on a closed line the shorter way round.
+
+        Parameters
+        ----------
+        contact
+            The number of the contact.
+
+        Returns
+        -------
+        ndarray
+            (dim - 1, k) [length].
+        """
         apart = self.places - self.places[:, [contact]]
         return apart if self.period is None else (apart + self.period / 2) % self.period - self.period / 2
 
     def images(self) -> tuple[np.ndarray, np.ndarray]:
-        """The whole surface: places (dim - 1, m) with those of all mirror images, and the contact (m,) of each.
+        """List the places of the whole surface, with those of all mirror images.
 
         A contact on a plane of symmetry or on an axis is its own image and stands there once.
+
+        Returns
+        -------
+        tuple
+            Places (dim - 1, m) [length], and the contact (m,) of each.
         """
         x, contact = self.places, np.arange(self.places.shape[1])
         near = ON_PLANE * np.abs(x).max(initial=0.0)
@@ -89,7 +124,13 @@ class Chart:
         return x, contact
 
     def spacing(self) -> np.ndarray:
-        """Distance (k,) between the two neighbours of every contact of a line, at an end to the only one [length]."""
+        """Compute the distance between the two neighbours of every contact of a line, at an end to the only one.
+
+        Returns
+        -------
+        ndarray
+            (k,) distances [length].
+        """
         order = self.order()
         steps, spacing = np.diff(self.places[0, order]), np.empty(len(order))
         if self.period is not None:

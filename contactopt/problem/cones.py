@@ -9,12 +9,34 @@ import numpy as np
 
 
 def split(blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Normal part (k,) and tangential part (k, dim - 1) of blocks (k, dim)."""
+    """Split blocks into their normal and tangential parts.
+
+    Parameters
+    ----------
+    blocks
+        (k, dim) forces or displacements, normal component first.
+
+    Returns
+    -------
+    tuple
+        The normal part (k,) and the tangential part (k, dim - 1). Both are views.
+    """
     return blocks[:, 0], blocks[:, 1:]
 
 
 def unit(t: np.ndarray) -> np.ndarray:
-    """The directions (k, d) of vectors t (k, d); zero where t is zero."""
+    """Compute the directions of vectors.
+
+    Parameters
+    ----------
+    t
+        (k, d) vectors.
+
+    Returns
+    -------
+    ndarray
+        (k, d) vectors of length one; zero where t is zero.
+    """
     length = np.linalg.norm(t, axis=1)[:, None]
     return np.divide(t, length, out=np.zeros(t.shape), where=length > 0)
 

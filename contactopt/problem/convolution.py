@@ -29,13 +29,26 @@ Symbols = dict[tuple[int, int], np.ndarray]  # (a, b) with a <= b -> real array
 
 
 def embedding(grid: tuple[int, ...]) -> tuple[int, ...]:
-    """Sizes M of the padded grid: twice a number that is at least that of the contacts and easy to halve and to transform."""
+    """Choose the size of the padded grid on which a convolution is transformed.
+
+    Each of its sizes is twice a number that is at least that of the contacts and easy to halve and to transform.
+
+    Parameters
+    ----------
+    grid
+        Number of contacts along each of the one or two axes.
+
+    Returns
+    -------
+    tuple
+        Number of points M along each axis.
+    """
     from scipy.fft import next_fast_len
 
     return tuple(2 ** (LEVELS + 1) * int(next_fast_len(-(-n // 2**LEVELS), real=True)) for n in grid)
 
 
-def odd_axes(a: int, b: int, axes: int) -> tuple[bool, ...]:
+def _odd_axes(a: int, b: int, axes: int) -> tuple[bool, ...]:
     """Along which axes of the grid K_ab is odd."""
     return tuple((a == c + 1) != (b == c + 1) for c in range(axes))
 
@@ -56,12 +69,26 @@ class Kernel:
 
     @classmethod
     def of_coefficients(cls, grid: tuple[int, ...], coefficients: Symbols) -> Kernel:
-        """From the coefficients K_ab at distances 0 to M / 2 along each axis, M as `embedding` gives it."""
+        """Make a kernel from its coefficients.
+
+        Parameters
+        ----------
+        grid
+            Number of contacts along each axis.
+        coefficients
+            For each pair of components (a, b) with a <= b the coefficients K_ab at distances 0 to M / 2 along each
+            axis, with M as `embedding` gives it [length / force].
+
+        Returns
+        -------
+        Kernel
+            The kernel.
+        """
         from scipy.fft import rfftn
 
         padded, symbols = embedding(grid), {}
         for (a, b), part in coefficients.items():
-            odd, whole = odd_axes(a, b, len(grid)), part
+            odd, whole = _odd_axes(a, b, len(grid)), part
             for axis, size in enumerate(padded):
                 mirrored = np.flip(np.delete(whole, [0, size // 2], axis), axis)
                 if odd[axis]:
@@ -113,21 +140,27 @@ class Kernel:
         return doubled or periodic
 
     def coarse(self) -> Kernel:
-        """The kernel between pairs (in 2D) or squares of four contacts: a force is spread evenly over them, displacements are means.
+        """Make the kernel between pairs (in 2D) or squares of four contacts.
 
-        Along each axis K_c(I) = (K(2 I - 1) + 2 K(2 I) + K(2 I + 1)) / 4, which is a product with cos^2 followed by the sum over
+        A force is spread evenly over them, and displacements are means. Along each axis
+        K_c(I) = (K(2 I - 1) + 2 K(2 I) + K(2 I + 1)) / 4, which is a product with cos^2 followed by the sum over
         the two frequencies that fall on one.
+
+        Returns
+        -------
+        Kernel
+            The kernel on the grid of half as many contacts along each axis.
         """
         symbols = {}
         for pair, symbol in self.symbols.items():
-            odd = odd_axes(*pair, len(self.grid))
+            odd = _odd_axes(*pair, len(self.grid))
             for axis, size in enumerate(self.padded):
-                last = axis == len(self.padded) - 1
-                count = size // 2 + 1 if last else size
+                final = axis == len(self.padded) - 1
+                count = size // 2 + 1 if final else size
                 shape = [count if i == axis else 1 for i in range(symbol.ndim)]
                 weighted = symbol * (np.cos(np.pi * np.arange(count) / size) ** 2).reshape(shape)
-                low = np.take(weighted, range(size // 4 + 1 if last else size // 2), axis)
-                if last:  # the frequency k + M / 2 is minus the frequency M / 2 - k
+                low = np.take(weighted, range(size // 4 + 1 if final else size // 2), axis)
+                if final:  # the frequency k + M / 2 is minus the frequency M / 2 - k
                     high = np.take(weighted, range(size // 2, size // 4 - 1, -1), axis)
                     high = _negated(high, axis, odd)
                 else:
@@ -138,7 +171,22 @@ class Kernel:
         return Kernel(tuple(-(-n // 2) for n in self.grid), halved, symbols)
 
     def act(self, x: np.ndarray, rows: tuple[int, ...], columns: tuple[int, ...], single: bool = False) -> np.ndarray:
-        """Displacements (rows, *grid) of the components `rows` under forces x (columns, *grid) of the components `columns`."""
+        """Compute displacements under forces.
+
+        Parameters
+        ----------
+        x
+            (columns, n0[, n1]) forces on the grid [force].
+        rows, columns
+            The components of the displacements and of the forces.
+        single
+            Whether single precision is enough.
+
+        Returns
+        -------
+        ndarray
+            (rows, n0[, n1]) displacements [length].
+        """
         symbols = self.single if single else self.symbols
         spectra = {}
         for b, part in zip(columns, x):
@@ -152,7 +200,7 @@ class Kernel:
                 if pair not in symbols:
                     continue
                 term = symbols[pair] * spectrum
-                if sum(odd_axes(a, b, len(self.grid))) == 1:
+                if sum(_odd_axes(a, b, len(self.grid))) == 1:
                     term *= np.array(1j if a < b else -1j, term.dtype)
                 total = term if total is None else np.add(total, term, out=total)
             if total is not None:
@@ -160,14 +208,25 @@ class Kernel:
         return out
 
     def entries(self) -> np.ndarray:
-        """The operator as an array (k dim, k dim)."""
+        """Write the operator as an array.
+
+        Returns
+        -------
+        ndarray
+            (k dim, k dim) [length / force].
+
+        Raises
+        ------
+        InputError
+            If it would be too large.
+        """
         k, dim = int(np.prod(self.grid)), self.dim
         check_dense(k * dim)
         places = np.indices(self.grid).reshape(len(self.grid), k)
         apart = places[:, :, None] - places[:, None, :]
         Q = np.zeros((k, dim, k, dim))
         for (a, b), symbol in self.symbols.items():
-            factor = 1j if sum(odd_axes(a, b, len(self.grid))) == 1 else 1.0
+            factor = 1j if sum(_odd_axes(a, b, len(self.grid))) == 1 else 1.0
             values = backward(factor * symbol, self.padded, self.padded)[tuple(apart)]
             Q[:, a, :, b] = values
             Q[:, b, :, a] = values.T
@@ -180,10 +239,23 @@ def _negated(high: np.ndarray, axis: int, odd: tuple[bool, ...]) -> np.ndarray:
 
 
 def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
-    """Fourier transform of x (*grid), padded by zeros; rows that hold nothing but padding are skipped."""
+    """Transform values on a grid, padded by zeros. Rows that hold nothing but padding are skipped.
+
+    Parameters
+    ----------
+    x
+        (n0[, n1]) real values, in single or double precision.
+    padded
+        Sizes (M0[, M1]) of the padded grid.
+
+    Returns
+    -------
+    ndarray
+        The transform, (M0 / 2 + 1,) in 2D and (M0, M1 / 2 + 1) in 3D, in the precision of x.
+    """
     from scipy.fft import fft, rfft
 
-    workers = workers_for(padded)
+    workers = _workers_for(padded)
     spectrum = rfft(x, n=padded[-1], axis=-1, workers=workers)
     if len(padded) == 2:
         spectrum = fft(spectrum, n=padded[0], axis=0, overwrite_x=True, workers=workers)
@@ -191,16 +263,31 @@ def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
 
 
 def backward(spectrum: np.ndarray, padded: tuple[int, ...], grid: tuple[int, ...]) -> np.ndarray:
-    """The part (*grid) of the inverse transform; `spectrum` is overwritten."""
+    """Transform back and keep the part of the grid.
+
+    Parameters
+    ----------
+    spectrum
+        The transform as `forward` gives it. It is overwritten.
+    padded
+        Sizes (M0[, M1]) of the padded grid.
+    grid
+        Number of contacts along each axis.
+
+    Returns
+    -------
+    ndarray
+        (n0[, n1]) real values.
+    """
     from scipy.fft import ifft, irfft
 
-    workers = workers_for(padded)
+    workers = _workers_for(padded)
     if len(padded) == 2:
         spectrum = ifft(spectrum, axis=0, overwrite_x=True, workers=workers)[: grid[0]]
     return np.asarray(irfft(spectrum, n=padded[-1], axis=-1, workers=workers))[..., : grid[-1]]
 
 
-def workers_for(padded: tuple[int, ...]) -> int:
+def _workers_for(padded: tuple[int, ...]) -> int:
     """Number of processors for transforms of that size; OMP_NUM_THREADS bounds it."""
     if np.prod(padded) < LARGE:
         return 1

@@ -19,5 +19,11 @@ class Counter:
         return self._total
 
     def add(self, number: int = 1) -> None:
-        """Count some more."""
+        """Count some more.
+
+        Parameters
+        ----------
+        number
+            How many.
+        """
         self._total += number

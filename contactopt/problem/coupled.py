@@ -35,19 +35,69 @@ class BodyTerm(Protocol):
     def low_rank(self) -> tuple[np.ndarray, np.ndarray]: ...
 
     def diagonal(self) -> Any:
-        """(N,) diagonal of A [force / length]."""
+        """Give the diagonal of A.
+
+        Returns
+        -------
+        ndarray
+            (N,) [force / length], or a vector elsewhere.
+        """
 
     def stiffness(self, X: Any) -> Any:
-        """A X (N,) [force]."""
+        """Multiply with A.
+
+        Parameters
+        ----------
+        X
+            (N,) displacement [length].
+
+        Returns
+        -------
+        ndarray
+            A X (N,) [force], or a vector elsewhere.
+        """
 
     def cycle(self, F: Any) -> Any:
-        """B F (N,), B symmetric positive definite and close to A^-1, e.g. one V-cycle of multigrid [length]."""
+        """Multiply with B, which is symmetric positive definite and close to A^-1, e.g. one V-cycle of multigrid.
+
+        Parameters
+        ----------
+        F
+            (N,) forces [force].
+
+        Returns
+        -------
+        ndarray
+            B F (N,) [length], or a vector elsewhere.
+        """
 
     def pulled(self, r: np.ndarray) -> Any:
-        """T' r (N,), the forces on the body under contact forces r (n,)."""
+        """Take contact forces to the unknowns of the body.
+
+        Parameters
+        ----------
+        r
+            (n,) contact forces [force].
+
+        Returns
+        -------
+        ndarray
+            T' r (N,) [force], or a vector elsewhere.
+        """
 
     def started_trace(self, X: Any) -> Callable[[], np.ndarray]:
-        """T X (n,), when it is called; elsewhere the work is ordered at once."""
+        """Begin to take a displacement to the contacts. Elsewhere the work is ordered at once.
+
+        Parameters
+        ----------
+        X
+            (N,) displacement [length].
+
+        Returns
+        -------
+        callable
+            A function without arguments that returns T X (n,) [length].
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,24 +151,48 @@ class CoupledForm:
         return self.counter.total
 
     def diagonal(self) -> Stacked:
-        """The diagonal of A."""
+        """Give the diagonal of A in all bodies, as a vector in parts."""
         return Stacked(tuple(in_turn(lambda term: term.diagonal() / self.factor, self.terms)))
 
     def pulled(self, r: np.ndarray) -> Stacked:
-        """T' r, the forces on the bodies under contact forces r (n,)."""
+        """Take contact forces r (n,) to the bodies: T' r, as a vector in parts."""
         return Stacked(tuple(in_turn(lambda term: term.pulled(r), self.terms)))
 
     def stiffness(self, X: Stacked) -> Stacked:
-        """A X."""
+        """Multiply displacements X of the bodies with A."""
         return Stacked(tuple(in_turn(lambda term, own: term.stiffness(own) / self.factor, self.terms, X.parts)))
 
     def approximate(self, F: Stacked) -> Stacked:
-        """B F, counted."""
+        """Multiply forces on the bodies with B, and count it.
+
+        Parameters
+        ----------
+        F
+            The forces in parts, one for each body [force].
+
+        Returns
+        -------
+        Stacked
+            B F [length].
+        """
         self.counter.add()
         return Stacked(tuple(in_turn(lambda term, own: term.cycle(own) * self.factor, self.terms, F.parts)))
 
     def moved(self, X: Stacked, r: np.ndarray) -> np.ndarray:
-        """T X + rest r (n,), which is Q r in equilibrium."""
+        """Compute the displacement at the contacts from displacements of the bodies and contact forces.
+
+        Parameters
+        ----------
+        X
+            Displacements of the bodies in parts [length].
+        r
+            (n,) contact forces [force].
+
+        Returns
+        -------
+        ndarray
+            T X + rest r (n,) [length], which is Q r in equilibrium.
+        """
         started = in_turn(lambda term, own: term.started_trace(own), self.terms, X.parts)
         total = self.rest(r)
         for own in started:
@@ -126,10 +200,36 @@ class CoupledForm:
         return total
 
     def unbalanced(self, X: Stacked, r: np.ndarray) -> Stacked:
-        """T' r - A X, the forces that are missing to equilibrium."""
+        """Compute the forces that are missing to equilibrium.
+
+        Parameters
+        ----------
+        X
+            Displacements of the bodies in parts [length].
+        r
+            (n,) contact forces [force].
+
+        Returns
+        -------
+        Stacked
+            T' r - A X [force].
+        """
         return self.pulled(r) - self.stiffness(X)
 
     def scaled(self, factor: float, added: np.ndarray) -> CoupledForm:
-        """The form of factor Q + diag(added), whose displacements X are in units in which A is A / factor."""
+        """Make the form of factor Q + diag(added).
+
+        Parameters
+        ----------
+        factor
+            What Q is multiplied with.
+        added
+            (n,) what is added to its diagonal.
+
+        Returns
+        -------
+        CoupledForm
+            The form, whose displacements X are in units in which A is A / factor.
+        """
         rest = self.rest
         return replace(self, rest=lambda r: factor * rest(r) + added * r, factor=factor * self.factor)

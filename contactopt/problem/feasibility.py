@@ -47,10 +47,22 @@ class Infeasible:
 
 
 def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasible | None:
-    """A proof that the problem has no solution, or None: then it may have one or not.
+    """Look for a proof that a problem has no solution.
 
-    Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not looked at. time_limit [s] bounds the
-    program. A positive definite Q without a plate needs none: every such problem has a solution.
+    Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not looked at. A
+    positive definite Q without a plate needs no search: every such problem has a solution.
+
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    time_limit
+        How long the linear program may take [s].
+
+    Returns
+    -------
+    Infeasible or None
+        The proof. None says nothing: the problem may have a solution or not.
     """
     if (
         not (problem.law.unilateral and problem.law.proportional)
@@ -68,7 +80,7 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = 5.0) -> Infeasi
     if ray is None:
         return None
     for _ in range(POLISH):
-        if verified(scaled, Q, *ray):
+        if _verified(scaled, Q, *ray):
             weights, motions = ray
             margin = -float(scaled.q[:, 0] @ weights + scaled.s @ motions) * scales.force * scales.length
             told = _sentence(scaled, weights, motions)
@@ -95,7 +107,7 @@ def _without_ridge(problem: InterfaceProblem, Q: sp.csr_array) -> sp.csr_array:
     return sp.csr_array(Q - sp.diags_array(np.where(held, Q.diagonal(), 0.0)))
 
 
-def verified(problem: InterfaceProblem, Q: sp.csr_array, weights: np.ndarray, motions: np.ndarray) -> bool:
+def _verified(problem: InterfaceProblem, Q: sp.csr_array, weights: np.ndarray, motions: np.ndarray) -> bool:
     """Whether (weights, motions) is a ray, with its conditions met to rounding and its margin far above it."""
     k, d = problem.q.shape
     if np.any(weights < 0) or not (np.all(np.isfinite(weights)) and np.all(np.isfinite(motions))):

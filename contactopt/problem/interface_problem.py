@@ -195,11 +195,35 @@ class InterfaceProblem:
         return digest.hexdigest()[:16]
 
     def explicit(self) -> InterfaceProblem:
-        """The same problem with Q an array; InputError if that would be too large (contactopt.problem.operators.MOST_BYTES)."""
+        """Make the same problem with Q an array.
+
+        Returns
+        -------
+        InterfaceProblem
+            The problem itself if its Q is an array.
+
+        Raises
+        ------
+        InputError
+            If that would be too large (contactopt.problem.operators.MOST_BYTES).
+        """
         return self if isinstance(self.Q, np.ndarray) else replace(self, Q=dense(self.Q))
 
     def displacements(self, reactions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """u = Q r + V lambda + q, (k, dim) [length]."""
+        """Compute the relative displacements u = Q r + V lambda + q.
+
+        Parameters
+        ----------
+        reactions
+            (k, dim) contact forces, normal first [force].
+        multipliers
+            (p,) multipliers lambda.
+
+        Returns
+        -------
+        ndarray
+            (k, dim) displacements, normal first [length].
+        """
         return (self.Q @ reactions.ravel() + self.V @ multipliers).reshape(self.q.shape) + self.q
 
 

@@ -83,7 +83,18 @@ class InterfaceOperator(LinearOperator):
         return self
 
     def to_dense(self) -> np.ndarray:
-        """Q as an array (n, n), symmetric to the last digit; n products unless there is a cheaper way."""
+        """Write Q as an array. It takes n products unless there is a cheaper way.
+
+        Returns
+        -------
+        ndarray
+            (n, n), symmetric to the last digit [length / force].
+
+        Raises
+        ------
+        InputError
+            If it would be too large.
+        """
         n = self.shape[0]
         check_dense(n)
         if self.entries is not None:
@@ -96,7 +107,22 @@ class InterfaceOperator(LinearOperator):
         return np.asarray((Q + Q.T) / 2)
 
     def scaled(self, factor: float, added: np.ndarray, counter: Counter | None = None) -> InterfaceOperator:
-        """factor Q + diag(added); its products are counted by `counter`, or by one of its own."""
+        """Make the operator factor Q + diag(added).
+
+        Parameters
+        ----------
+        factor
+            What Q is multiplied with.
+        added
+            (n,) what is added to its diagonal.
+        counter
+            Counts its products; by default one of its own.
+
+        Returns
+        -------
+        InterfaceOperator
+            The operator.
+        """
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
             return factor * self.product(X, accuracy) + added[:, None] * X
@@ -108,13 +134,35 @@ class InterfaceOperator(LinearOperator):
         return InterfaceOperator(product, diagonal, exact, self.accuracy, self.inexact, coupled, counter, self.held)
 
     def loosened(self, accuracy: float) -> InterfaceOperator:
-        """The same operator, its products no more accurate than that; both count together."""
+        """Make the same operator with less accurate products. Both count together.
+
+        Parameters
+        ----------
+        accuracy
+            Relative accuracy of a product that is good enough.
+
+        Returns
+        -------
+        InterfaceOperator
+            The operator.
+        """
         return InterfaceOperator(
             self.product, self.diagonal, self.entries, accuracy, self.inexact, self.coupled, self.counter, self.held
         )
 
     def block(self, unknowns: np.ndarray) -> InterfaceOperator:
-        """Q on some unknowns (m,) alone, e.g. its normal block (every dim-th) or an active set; both count together."""
+        """Take Q on some unknowns alone, e.g. its normal block (every dim-th) or an active set. Both count together.
+
+        Parameters
+        ----------
+        unknowns
+            (m,) their numbers.
+
+        Returns
+        -------
+        InterfaceOperator
+            The operator (m, m).
+        """
         unknowns = np.asarray(unknowns)
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
@@ -340,15 +388,23 @@ def loosened(Q: Interface, accuracy: float) -> Interface:
 
 
 def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
-    """Weights w (k,) of the contacts with diag(Q) about proportional to 1 / w^2; the mean of w^2 is one.
+    """Compute weights w of the contacts with diag(Q) about proportional to 1 / w^2.
 
     A force that is spread over the area of a node makes a displacement proportional to 1 / length of the contact line
-    there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area / spacing on a line, sqrt(area) on a surface.
+    there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area / spacing on a line, sqrt(area) on a
+    surface.
 
     Parameters
     ----------
-    chart : the k contacts on their surface [length]
-    areas : (k,) nodal areas
+    chart
+        The places of the k contacts on their surface [length].
+    areas
+        (k,) nodal areas [length^2].
+
+    Returns
+    -------
+    ndarray
+        (k,) positive weights [-]. The mean of w^2 is one.
     """
     if len(chart.places) == 2:
         square = np.sqrt(areas)

@@ -39,12 +39,36 @@ class Pair:
         return slice(self.start, self.stop)
 
     def unknowns(self, dim: int) -> np.ndarray:
-        """Numbers of the pair's rows in Q."""
+        """Number the pair's rows in Q.
+
+        Parameters
+        ----------
+        dim
+            Number of components of a contact.
+
+        Returns
+        -------
+        ndarray
+            (k_i dim,) numbers of the rows.
+        """
         return np.arange(self.start * dim, self.stop * dim)
 
 
 def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
-    """The contacts of one pair as a problem, without forces at all others. Where there is one pair only, the problem itself."""
+    """Take the contacts of one pair of surfaces as a problem, without forces at all others.
+
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    pair
+        One of its pairs, with k_i contacts.
+
+    Returns
+    -------
+    InterfaceProblem
+        The problem of the k_i contacts. Where there is one pair only, it is the problem itself.
+    """
     if len(problem.pairs) == 1:
         return problem
     rows, own = pair.unknowns(problem.dim), pair.contacts
@@ -62,15 +86,29 @@ def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
 
 
 def alone(problem: InterfaceProblem, solution: Solution, pair: Pair) -> tuple[InterfaceProblem, Solution]:
-    """The problem of one pair with the forces of all other pairs held at those of the solution, and its part of the solution.
+    """Take one pair of surfaces alone, with the forces of all other pairs as they are in the solution.
 
     The displacements of the pair are the same functions of its own forces, and the loads are those that the solution's
-    forces on the pair balance, so that a solution of the whole problem gives one of this problem. Where there is one pair
-    only, both are returned as they are.
+    forces on the pair balance. A solution of the whole problem therefore gives one of this problem. Where there is one
+    pair only, both are returned as they are.
+
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    solution
+        A solution of it.
+    pair
+        One of its pairs, with k_i contacts.
+
+    Returns
+    -------
+    tuple
+        The problem of the k_i contacts, and the solution with their reactions (k_i, dim).
     """
     if len(problem.pairs) == 1:
         return problem, solution
     part, r, lam = part_of(problem, pair), solution.reactions[pair.contacts], solution.multipliers
     apart = problem.displacements(solution.reactions, lam)[pair.contacts] - part.displacements(r, lam)
-    held = replace(part, q=part.q + apart, s=-(part.V.T @ r.ravel()))
-    return held, replace(solution, reactions=r, displacements=None)
+    own = replace(part, q=part.q + apart, s=-(part.V.T @ r.ravel()))
+    return own, replace(solution, reactions=r, displacements=None)

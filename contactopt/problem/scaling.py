@@ -20,19 +20,54 @@ class Scales:
     multipliers: np.ndarray
 
     def to_physical(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Take dimensionless reactions and multipliers to the units of the problem.
+
+        Parameters
+        ----------
+        reactions, multipliers
+            (k, dim) and (p,) of the dimensionless problem.
+
+        Returns
+        -------
+        tuple
+            Both in the units of the problem.
+        """
         return reactions * self.force, multipliers * self.multipliers
 
     def to_dimensionless(self, reactions: np.ndarray, multipliers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Take reactions and multipliers to the units of the dimensionless problem.
+
+        Parameters
+        ----------
+        reactions, multipliers
+            (k, dim) [force] and (p,) in the units of the problem.
+
+        Returns
+        -------
+        tuple
+            Both without units.
+        """
         return reactions / self.force, multipliers / self.multipliers
 
 
 def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
-    """The same problem with mean diagonal of Q one, forces of order one and unit columns of V.
+    """Scale a problem so that the mean diagonal of Q is one, forces are of order one and the columns of V have length
+    one.
 
     The force scale is the mean force that the balance asks of a node or, without a balance, the force that removes the
-    root-mean-square overlap at one node; gaps, however wide, do not count. Every change of units of the input gives the same numbers here.
-    A component that cannot move (on a symmetry plane, say) carries no force that matters: a unit compliance there
-    makes that force zero instead of undetermined.
+    root-mean-square overlap at one node. Gaps, however wide, do not count. Every change of units of the input gives the
+    same numbers here. A component that cannot move (on a symmetry plane, say) carries no force that matters: a unit
+    compliance there makes that force zero instead of undetermined.
+
+    Parameters
+    ----------
+    problem
+        The interface problem in its own units.
+
+    Returns
+    -------
+    tuple
+        The dimensionless problem, and the Scales that take its reactions and multipliers back.
     """
     d = diagonal(problem.Q)
     columns = np.linalg.norm(problem.V, axis=0)
@@ -46,15 +81,15 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     force = balanced or _closing(problem) / compliance or 1.0
     length = force * compliance
     columns = np.where(columns > 0, columns, 1.0)
-    rigid = immovable(problem)
+    held = immovable(problem)
     Q: Interface
     if isinstance(problem.Q, InterfaceOperator):
-        Q = problem.Q.scaled(1 / compliance, rigid.astype(float))
+        Q = problem.Q.scaled(1 / compliance, held.astype(float))
     elif sp.issparse(problem.Q):
-        Q = sp.csr_array(problem.Q / compliance + sp.diags_array(rigid.astype(float)))
+        Q = sp.csr_array(problem.Q / compliance + sp.diags_array(held.astype(float)))
     else:
         entries = np.array(problem.Q / compliance)
-        entries[rigid, rigid] = 1.0
+        entries[held, held] = 1.0
         Q = entries
     scaled = replace(
         problem,
@@ -68,14 +103,25 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
 
 
 def immovable(problem: InterfaceProblem) -> np.ndarray:
-    """Mask (k dim,) of the components that neither forces nor multipliers nor q move."""
+    """Find the components that neither forces nor multipliers nor q move.
+
+    Parameters
+    ----------
+    problem
+        The interface problem.
+
+    Returns
+    -------
+    ndarray
+        (k dim,) mask, True where a component cannot move.
+    """
     d = np.abs(diagonal(problem.Q))
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
-    still = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
-    if still.any() and not isinstance(problem.Q, InterfaceOperator):
-        rows = np.flatnonzero(still)
-        still[rows] = row_sizes(problem.Q[rows]) <= NOISE * d.max(initial=0.0)
-    return still
+    held = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
+    if held.any() and not isinstance(problem.Q, InterfaceOperator):
+        rows = np.flatnonzero(held)
+        held[rows] = row_sizes(problem.Q[rows]) <= NOISE * d.max(initial=0.0)
+    return held
 
 
 def _closing(problem: InterfaceProblem) -> float:

@@ -18,7 +18,20 @@ Act = Callable[..., Any]
 
 
 def in_turn(act: Act, *columns: Iterable[Any]) -> list[Any]:
-    """`act` on the entries of the columns row by row, first where the entry of the first column is elsewhere."""
+    """Apply a function to the entries of columns row by row, first where the entry of the first column is elsewhere.
+
+    Parameters
+    ----------
+    act
+        A function of as many arguments as there are columns.
+    columns
+        Columns of equal length.
+
+    Returns
+    -------
+    list
+        What the function returned, in the order of the rows.
+    """
     rows = list(zip(*columns))
     made = {i: act(*rows[i]) for here in (False, True) for i, row in enumerate(rows) if _here(row[0]) is here}
     return [made[i] for i in range(len(rows))]
@@ -61,11 +74,33 @@ class Stacked:
         return self._each(operator.mul, -1.0)
 
     def astype(self, kind: Any) -> Stacked:
-        """The vector in another precision."""
+        """Convert the vector to another precision.
+
+        Parameters
+        ----------
+        kind
+            The type of its entries.
+
+        Returns
+        -------
+        Stacked
+            The vector in the same parts.
+        """
         return self._each(lambda part, kind: part.astype(kind), kind)
 
     def dot(self, other: Stacked) -> float:
-        """The scalar product."""
+        """Compute the scalar product with another vector.
+
+        Parameters
+        ----------
+        other
+            A vector in the same parts.
+
+        Returns
+        -------
+        float
+            The sum over all parts.
+        """
         sums = in_turn(_started_dot, self.parts, other.parts)
         return sum(own() for own in sums)
 
@@ -83,10 +118,32 @@ def _started_dot(x: Any, y: Any) -> Callable[[], float]:
 
 
 def dot(x: Vector, y: Vector) -> float:
-    """x' y."""
+    """Compute the scalar product x' y.
+
+    Parameters
+    ----------
+    x, y
+        Two arrays (n,), or two vectors in the same parts.
+
+    Returns
+    -------
+    float
+        The sum. It does not depend on where the parts are.
+    """
     return float(x.dot(y)) if isinstance(x, Stacked) else float(np.einsum("i,i", x, y))
 
 
 def norm(x: Vector) -> float:
-    """Euclidean norm."""
+    """Compute the Euclidean norm of a vector.
+
+    Parameters
+    ----------
+    x
+        An array (n,), or a vector in parts.
+
+    Returns
+    -------
+    float
+        The square root of x' x.
+    """
     return float(np.sqrt(dot(x, x)))

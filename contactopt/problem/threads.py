@@ -10,16 +10,29 @@ from threadpoolctl import threadpool_limits
 
 
 def cores() -> int:
-    """Number of cores that this process may use. OMP_NUM_THREADS does not bound it: that is for the threads of BLAS."""
+    """Count the cores that this process may use.
+
+    OMP_NUM_THREADS does not bound it: that is for the threads of BLAS.
+
+    Returns
+    -------
+    int
+        The number of cores, at least 1.
+    """
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """One thread of BLAS inside.
+    """Let BLAS use one thread inside the block.
 
-    It is for work with many small dense products, between which further threads would only spin. The limit holds for the
-    whole process, so that one thread alone may set it at a time.
+    It is for work with many small dense products, between which further threads would only spin. The limit holds for
+    the whole process, so that one thread alone may set it at a time.
+
+    Yields
+    ------
+    None
+        Nothing; the block runs under the limit.
     """
     with threadpool_limits(1, user_api="blas"):
         yield

@@ -18,7 +18,30 @@ MOST_ELEMENTS = 2_000_000  # elements of a structured body
 
 
 def make_mesh(body: Table, folder: Path | None, components: tuple[str, ...], length: str) -> Any:
-    """The mesh that a body's table describes, moved to its place, with its boundaries; None without a folder: entries are only known."""
+    """Make the mesh that a body's table describes, moved to its place, with its boundaries.
+
+    Parameters
+    ----------
+    body
+        The table of the body in a scene file.
+    folder
+        The folder to which names of mesh files are relative. Without one no mesh is made, and the entries are only
+        marked as known.
+    components
+        Names of the components of the scene, such as ('x', 'y').
+    length
+        The scene's unit of length, to which a mesh file's unit is converted.
+
+    Returns
+    -------
+    Mesh or None
+        The scikit-fem mesh, or None without a folder.
+
+    Raises
+    ------
+    InputError
+        With the line of the table, where the shape is missing or does not fit the scene.
+    """
     group, move, places = body.text("group"), body.table("move"), body.table("boundaries")
     unit, shapes = body.text("unit"), [shape for shape in SHAPES if body.has(shape)]
     body.known.append("rigid")

@@ -15,7 +15,22 @@ MARGIN = 1.25  # candidate contact zone of round bodies, over the half-width its
 
 
 def with_elements(scene: Scene, degree: int | None = None, simplices: bool = False) -> Scene:
-    """The scene with displacements of that degree (None: its own), its quadrilaterals or hexahedra cut into simplices or not."""
+    """Give a scene other elements.
+
+    Parameters
+    ----------
+    scene
+        The scene, which stays as it is.
+    degree
+        Degree of the displacement, 1 or 2; by default the scene's own.
+    simplices
+        Whether quadrilaterals and hexahedra are cut into triangles and tetrahedra.
+
+    Returns
+    -------
+    Scene
+        The scene with these elements.
+    """
 
     def cut(part: Any) -> Any:
         if not simplices or not isinstance(part, Part):

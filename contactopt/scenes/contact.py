@@ -48,7 +48,7 @@ class Contact:
             raise InputError(f"the carrier of contact '{self.name}' must be 'upper', 'lower' or None.")
         find_law(self.law)
         if not callable(self.mu):
-            check_friction(self.mu)
+            _check_friction(self.mu)
 
     @property
     def bodies(self) -> tuple[str, str]:
@@ -72,7 +72,7 @@ class Contact:
         return f"{name} = {self.mu:g}" if isinstance(self.mu, (int, float)) else f"{name} varies"
 
 
-def check_friction(mu: Any) -> None:
+def _check_friction(mu: Any) -> None:
     """Raise InputError unless mu is a number, or an array of numbers, that are not negative."""
     name = "the friction coefficient mu"
     if not isinstance(mu, (list, tuple)) and np.ndim(mu) == 0:

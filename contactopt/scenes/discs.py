@@ -9,11 +9,21 @@ from skfem import MeshHex
 
 
 def half_disc(radii: np.ndarray, sectors: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (2, n) and quadrilaterals (4, m) of the half disc y >= 0.
+    """Make nodes and quadrilaterals of the half disc y >= 0.
 
-    radii    of the rings of nodes, from 0 up [length]; at least 2 sectors + 1, the first so many evenly spaced
-    sectors  in an eighth of the circle
-    The innermost rings are squares, those from number 2 sectors on are circles, with a gradual change between.
+    The innermost rings of nodes are squares. Those from number 2 sectors on are circles, with a gradual change between.
+
+    Parameters
+    ----------
+    radii
+        Radii of the rings of nodes, from 0 up [length]; at least 2 sectors + 1, the first so many evenly spaced.
+    sectors
+        Number of elements along an eighth of the circle.
+
+    Returns
+    -------
+    tuple
+        The nodes (2, n) [length], and the numbers (4, m) of the nodes of each quadrilateral.
     """
     i, j = (x.ravel() for x in np.meshgrid(np.arange(-sectors, sectors + 1), np.arange(sectors + 1), indexing="ij"))
     ring = np.maximum(np.abs(i), j)
@@ -46,7 +56,22 @@ def _on_ring(
 
 
 def extrude(p: np.ndarray, t: np.ndarray, z: np.ndarray) -> MeshHex:
-    """Bricks over plane nodes (2, n) and quadrilaterals (4, m) between the heights z, ascending."""
+    """Stack bricks over a plane mesh.
+
+    Parameters
+    ----------
+    p
+        (2, n) plane nodes [length].
+    t
+        (4, m) numbers of the nodes of each quadrilateral.
+    z
+        (j,) heights of the layers of nodes, ascending [length].
+
+    Returns
+    -------
+    MeshHex
+        The mesh of (j - 1) m bricks.
+    """
     n, levels = p.shape[1], len(z)
     points = np.concatenate([np.tile(p, levels), np.repeat(z, n)[None]])
     a, b, c, d = (corner + n * np.arange(levels - 1)[:, None] for corner in t)

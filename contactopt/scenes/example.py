@@ -55,11 +55,23 @@ tol = 1e-8
 # accuracy = 0.01               # refine plane meshes until the quantity is known to this relative error
 # quantity = "pressure"
 # adaptive = true               # only where the quantity needs it
+# max_unknowns = 50000          # bounds on the search: time_limit = 60 seconds, max_memory = 4 GB
 """
 
 
 def write_example(path: Path) -> None:
-    """Write the example; InputError where a file is there already, or none can be written."""
+    """Write an example of a scene file, with a comment on every entry.
+
+    Parameters
+    ----------
+    path
+        The file, whose name ends in .toml.
+
+    Raises
+    ------
+    InputError
+        If the name has another ending, if the file is there already, or if it cannot be written.
+    """
     if path.suffix != ".toml":
         raise InputError(f"a scene file's name ends in .toml; got '{path}'.")
     try:

@@ -94,15 +94,20 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
 
 
 def name_boundaries(mesh: skfem.Mesh, places: Mapping[str, Mapping[int, tuple[float, float]]]) -> skfem.Mesh:
-    """The mesh with further boundaries that are named by where they are.
+    """Add boundaries to a mesh that are named by where they are.
 
     Parameters
     ----------
     mesh
         Any mesh.
     places
-        Name -> {axis: (least, largest coordinate)}: the facets of the surface whose corners all lie within these limits, to
-        a millionth of the size of the body.
+        Name -> {axis: (least, largest coordinate)}: the facets of the surface whose corners all lie within these
+        limits, to a millionth of the size of the body.
+
+    Returns
+    -------
+    Mesh
+        The mesh with these boundaries beside its own.
 
     Raises
     ------

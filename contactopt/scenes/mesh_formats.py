@@ -64,7 +64,23 @@ class FileGroups:
 
 
 def read_groups(path: Path) -> FileGroups:
-    """Read a mesh file; InputError in one sentence, whatever is wrong with it."""
+    """Read a mesh file with its groups.
+
+    Parameters
+    ----------
+    path
+        A file in any format that meshio reads.
+
+    Returns
+    -------
+    FileGroups
+        Nodes, elements by their kind, and the groups of elements and of nodes by their names.
+
+    Raises
+    ------
+    InputError
+        In one sentence, whatever is wrong with the file.
+    """
     mesh = _read(path)
     blocks = tuple((block.type, np.asarray(block.data), int(block.dim)) for block in mesh.cells)
     if not any(len(nodes) for _, nodes, _ in blocks):

@@ -78,11 +78,23 @@ class Cells:
 
 
 def text(x: np.ndarray) -> str:
+    """Write coordinates for a message, with six digits each."""
     return ", ".join(f"{value:.6g}" for value in x)
 
 
 def complete(cells: Cells) -> Cells:
-    """Serendipity elements with the nodes that they lack, at the places that their own shape functions give."""
+    """Give serendipity elements the nodes that they lack, at the places that their own shape functions give.
+
+    Parameters
+    ----------
+    cells
+        The elements of a file.
+
+    Returns
+    -------
+    Cells
+        Quadrilaterals of nine and hexahedra of 27 nodes in place of those of eight and twenty; others as they are.
+    """
     if cells.kind not in COMPLETE:
         return cells
     c = cells.points[:, cells.nodes]
@@ -96,7 +108,20 @@ def complete(cells: Cells) -> Cells:
 
 
 def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
-    """For every node the one that stands for it and for all others at its place."""
+    """Find for every node the one that stands for it and for all others at its place.
+
+    Parameters
+    ----------
+    cells
+        The elements of a file, with n nodes.
+    repair
+        Whether nodes at one place are a fault of the file, which is told in a line of the log.
+
+    Returns
+    -------
+    ndarray
+        (n,) numbers of nodes: of each group at one place the first.
+    """
     own = np.arange(cells.points.shape[1])
     used = np.unique(cells.nodes)
     size = np.linalg.norm(np.ptp(cells.points[:, cells.corners], axis=1), axis=0)
@@ -119,7 +144,25 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
 
 
 def repaired(cells: Cells, merged: np.ndarray) -> Cells:
-    """The elements on the merged nodes, each once, with their corners numbered the right way round."""
+    """Put the elements on the merged nodes, each once, with their corners numbered the right way round.
+
+    Parameters
+    ----------
+    cells
+        The elements of a file, with n nodes.
+    merged
+        (n,) for every node the one that stands for it, from `representatives`.
+
+    Returns
+    -------
+    Cells
+        The repaired elements. What was repaired is told in the log.
+
+    Raises
+    ------
+    InputError
+        If two corners of an element coincide.
+    """
     sets = np.sort(merged[cells.corners], axis=0)
     flat = np.flatnonzero(np.any(np.diff(sets, axis=0) == 0, axis=0))
     if len(flat):
@@ -143,7 +186,18 @@ def repaired(cells: Cells, merged: np.ndarray) -> Cells:
 
 
 def pieces(cells: Cells) -> int:
-    """Into how many pieces the elements fall that share no node."""
+    """Count the pieces into which the elements fall that share no node.
+
+    Parameters
+    ----------
+    cells
+        The elements of a file.
+
+    Returns
+    -------
+    int
+        The number of pieces.
+    """
     first = np.broadcast_to(cells.corners[0], cells.corners.shape)
     size = cells.points.shape[1]
     graph = coo_matrix((np.ones(first.size), (first.ravel(), cells.corners.ravel())), (size, size))
@@ -152,7 +206,20 @@ def pieces(cells: Cells) -> int:
 
 
 def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
-    """Raise InputError unless all elements have volume and nowhere fold over, and no facet belongs to more than two."""
+    """Check that all elements have volume and nowhere fold over, and that no facet belongs to more than two.
+
+    Parameters
+    ----------
+    cells
+        The elements of the file, whose names are told.
+    mesh
+        The mesh that was made of them.
+
+    Raises
+    ------
+    InputError
+        With the name of the first element that is wrong.
+    """
     places = np.asarray(mesh.elem().doflocs).T
     places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
     volume = np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1))
@@ -171,7 +238,20 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
 
 
 def check_surface(path: Path, mesh: skfem.Mesh) -> None:
-    """Raise InputError unless the outward normals of the surface integrate to zero, as those of a closed surface do."""
+    """Check that the outward normals of a body's surface integrate to zero, as those of a closed surface do.
+
+    Parameters
+    ----------
+    path
+        The mesh file, for the message.
+    mesh
+        The mesh that was made of it.
+
+    Raises
+    ------
+    InputError
+        If they do not, because elements overlap.
+    """
     surface = skfem.FacetBasis(mesh, mesh.elem(), facets=mesh.boundary_facets())
     total = np.abs((np.asarray(surface.normals) * surface.dx).sum(axis=(1, 2))).max()
     if total > CLOSED * surface.dx.sum():

@@ -17,7 +17,18 @@ import numpy as np
 
 
 def version(path: Path) -> str | None:
-    """The version that a Gmsh file states, such as '4.1'; '4' stands for 4.0. None: it is no such file."""
+    """Read the version that a Gmsh file states.
+
+    Parameters
+    ----------
+    path
+        A file of any kind.
+
+    Returns
+    -------
+    str or None
+        The version, such as '4.1'; '4' stands for 4.0. None if it is no file of Gmsh.
+    """
     with path.open("rb") as file:
         head = file.read(200).decode(errors="replace").split()
     if head[:1] == ["$NOD"]:
@@ -26,9 +37,24 @@ def version(path: Path) -> str | None:
 
 
 def read_msh4(path: Path, newer: bool) -> Any:
-    """The meshio.Mesh of a text file of version 4.0 or, if `newer`, of 4.1, its physical groups as sets of elements by name.
+    """Read a text file of Gmsh of version 4.0 or 4.1.
 
-    Raises ValueError or KeyError where the file ends early or does not keep to the format.
+    Parameters
+    ----------
+    path
+        The file.
+    newer
+        Whether its version is 4.1.
+
+    Returns
+    -------
+    meshio.Mesh
+        The mesh, with the physical groups as sets of elements by name.
+
+    Raises
+    ------
+    ValueError, KeyError
+        Where the file ends early or does not keep to the format.
     """
     import meshio
     from meshio._common import num_nodes_per_cell

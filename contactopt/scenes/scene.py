@@ -112,12 +112,37 @@ class Part:
                 raise InputError(f"body '{self.name}': a boundary is given by its name; got {short(boundary)}.")
 
     def curve_of(self, boundary: str) -> Callable[[np.ndarray], np.ndarray] | None:
-        """The function that puts points of that contact boundary on its surface, if there is one."""
+        """Find the function that puts points of a contact boundary on its surface.
+
+        Parameters
+        ----------
+        boundary
+            The name of the boundary.
+
+        Returns
+        -------
+        callable or None
+            A function of points (dim, m) to points (dim, m) [length], if there is one.
+        """
         if callable(self.curve):
             return self.curve if boundary == self.contact else None
         return (self.curve or {}).get(boundary)
 
     def build_mesh(self, elements: int, zone: float | None) -> Any:
+        """Make the mesh of the body.
+
+        Parameters
+        ----------
+        elements
+            Number across the contact half-width.
+        zone
+            Half-width of contact that the mesh resolves [length]; None: the scene's first guess.
+
+        Returns
+        -------
+        Mesh
+            A scikit-fem mesh; the given one, if the part has a mesh and no function.
+        """
         return self.mesh(elements, zone) if callable(self.mesh) else self.mesh
 
 
@@ -183,7 +208,27 @@ class HalfSpace:
             raise InputError(f"half-space '{self.name}': periodic must be True or False; got {short(self.periodic)}.")
 
     def ticks(self, elements: int, zone: float | None, axes: int) -> tuple[np.ndarray, ...]:
-        """Places along each of the axes; InputError unless they are evenly spaced and growing."""
+        """Compute the places of the points along each of the axes.
+
+        Parameters
+        ----------
+        elements
+            Number across the contact half-width, for points that are given by a function.
+        zone
+            Half-width that they resolve [length].
+        axes
+            Number of axes.
+
+        Returns
+        -------
+        tuple
+            Places (n_i,) along each axis [length].
+
+        Raises
+        ------
+        InputError
+            Unless they are evenly spaced and growing, at least four along each axis.
+        """
         given = self.points(elements, zone) if callable(self.points) else self.points
         if not isinstance(given, (tuple, list, np.ndarray)) or len(given) == 0:
             raise InputError(
@@ -290,13 +335,35 @@ class Scene:
         return (Contact(self.upper.name, self.lower.name, self.mu, self.law),)
 
     def with_parts(self, change: Callable[[Any], Any]) -> Scene:
-        """The scene with `change` applied to each of its bodies."""
+        """Change the bodies of a scene.
+
+        Parameters
+        ----------
+        change
+            A function of a body that returns another one.
+
+        Returns
+        -------
+        Scene
+            The scene with the bodies that it returned.
+        """
         if self.upper is None or self.lower is None:
             return replace(self, bodies=tuple(change(part) for part in self.bodies))
         return replace(self, upper=change(self.upper), lower=change(self.lower))
 
     def surfaces_of(self, part: Any) -> tuple[str, ...]:
-        """Names of the boundaries of a part that contacts use, each once, in the order of the pairs."""
+        """Name the boundaries of a part that contacts use.
+
+        Parameters
+        ----------
+        part
+            One of the bodies.
+
+        Returns
+        -------
+        tuple
+            The names, each once, in the order of the pairs.
+        """
         found = [
             surface or part.contact
             for pair in self.pairs
@@ -396,7 +463,7 @@ class Scene:
                 or len(load.value) != self.dim
             ):
                 raise InputError(
-                    f"body '{part.name}': a {type(load).__name__} needs {self.dim} values "
+                    f"body '{part.name}': a {type(load).__name__} needs a tuple of {self.dim} values "
                     f"({', '.join(self.components)}); got {short(load.value)}."
                 )
             else:
@@ -407,7 +474,10 @@ class Scene:
 
     def _check_components(self, body: str, values: Mapping[str, float]) -> None:
         if not isinstance(values, Mapping):
-            raise InputError(f"body '{body}': a value is given for each component by its name; got {short(values)}.")
+            raise InputError(
+                f"body '{body}': a value is given for each component by its name, as in "
+                f"{{{self.components[-1]!r}: 0.0}}; got {short(values)}."
+            )
         for component, value in values.items():
             if component not in self.components:
                 others = [kind for kind, names in COMPONENTS.items() if component in names]

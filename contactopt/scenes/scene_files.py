@@ -23,6 +23,8 @@ from contactopt.scenes.toml_table import Table, read_table
 
 SOLVE = ("method", "normal", "tangential", "preconditioner", "Q", "solver", "quantity")  # texts, as for contactopt.run
 
+BOUNDS = ("tol", "accuracy", "time_limit", "max_memory")  # positive numbers, as for contactopt.run
+
 
 @dataclass(frozen=True)
 class SceneFile:
@@ -40,7 +42,18 @@ class SceneFile:
     lines: dict[str, int]
 
     def located(self, error: InputError) -> InputError:
-        """The error with the line of the body or contact that it names, if it names one."""
+        """Tell where in the file a mistake is.
+
+        Parameters
+        ----------
+        error
+            An error that may name a body or contact.
+
+        Returns
+        -------
+        InputError
+            The error with the name of the file, and with the line of the body or contact that it names.
+        """
         for name, line in self.lines.items():
             if f"'{name}'" in str(error):
                 return InputError(f"{self.name}, line {line}: {error}")
@@ -75,6 +88,11 @@ def read_scene_file(path: str | Path) -> SceneFile:
     ----------
     path
         A TOML file. The names of mesh files in it are relative to its folder.
+
+    Returns
+    -------
+    SceneFile
+        The states of the scene, one unless it is a load path, and how they are solved.
 
     Raises
     ------
@@ -289,7 +307,8 @@ def _contact(table: Table, parts: list[Part | Rigid], reading: _Reading) -> Cont
 def _solve(table: Table | None) -> dict[str, Any]:
     if table is None:
         return {}
-    found = {key: table.text(key) for key in SOLVE} | {key: table.number(key, low=0.0) for key in ("tol", "accuracy")}
+    found = {key: table.text(key) for key in SOLVE} | {key: table.number(key, low=0.0) for key in BOUNDS}
+    found["max_unknowns"] = table.take("max_unknowns", int, "a whole number")
     found["adaptive"] = table.take("adaptive", bool, "true or false")
     if (found["accuracy"] is None) != (found["quantity"] is None):
         raise table.fail("'accuracy' and 'quantity' belong together: the bound, and the name of what it bounds.")
@@ -298,7 +317,25 @@ def _solve(table: Table | None) -> dict[str, Any]:
 
 
 def with_degree(file: SceneFile, changes: dict[str, Any]) -> tuple[Scene, ...]:
-    """The states with another degree of the displacement; InputError for other changes."""
+    """Give the states of a scene file another degree of the displacement.
+
+    Parameters
+    ----------
+    file
+        The scene file.
+    changes
+        {'degree': 1 or 2}, or nothing.
+
+    Returns
+    -------
+    tuple
+        The states with the changes.
+
+    Raises
+    ------
+    InputError
+        For any other change: a scene file says everything itself.
+    """
     for key in changes:
         if key != "degree":
             raise InputError(f"a scene file says everything itself; change {key!r} there, or give the degree alone.")

@@ -27,11 +27,14 @@ def self_affine(
     slope: float = 0.1,
     seed: int = 0,
 ) -> np.ndarray:
-    """Heights (nx, ny) of a periodic self-affine rough surface [length], drawn from a seed.
+    """Draw heights of a periodic self-affine rough surface from a seed.
 
-    The heights are Gaussian. Their power spectrum falls with the wave number k as k^(-2 (1 + hurst)) between the wavelengths
-    `roll_off` and `shortest`, is constant from `longest` to `roll_off`, and zero beyond. The same seed gives the same waves on
-    every grid that resolves `shortest`.
+    The heights are Gaussian. Their power spectrum falls with the wave number k as k^(-2 (1 + hurst)) between the
+    wavelengths `roll_off` and `shortest`, is constant from `longest` to `roll_off`, and zero beyond. The same seed
+    gives the same waves on every grid that resolves `shortest`.
+
+    Source: Persson et al. (2005), On the nature of surface roughness with application to contact mechanics, J. Phys.:
+    Condens. Matter 17, R1-R62.
 
     Parameters
     ----------
@@ -48,13 +51,15 @@ def self_affine(
     seed
         Of the random numbers.
 
+    Returns
+    -------
+    ndarray
+        (nx, ny) heights [length].
+
     Raises
     ------
     InputError
         On cut-offs that are out of order or that the points do not resolve.
-
-    Source: Persson et al. (2005), On the nature of surface roughness with application to contact mechanics, J. Phys.: Condens.
-    Matter 17, R1-R62.
     """
     for name, pair in (("points", points), ("lengths", lengths)):
         if np.shape(pair) != (2,):
@@ -96,17 +101,41 @@ def self_affine(
 
 
 def rms_slope(heights: np.ndarray, lengths: tuple[float, float]) -> float:
-    """Root mean square of the gradient of periodic heights (nx, ny) [-], by Fourier transform."""
+    """Compute the root mean square of the gradient of a periodic rough surface.
+
+    Parameters
+    ----------
+    heights
+        (nx, ny) heights [length].
+    lengths
+        Lengths of the period along x and y [length].
+
+    Returns
+    -------
+    float
+        The root mean square [-].
+    """
     spectrum = np.fft.fft2(heights) / heights.size
     k = np.meshgrid(*(np.fft.fftfreq(n, size / n) for n, size in zip(heights.shape, lengths)), indexing="ij")
     return float(np.sqrt(np.sum((2 * np.pi) ** 2 * (k[0] ** 2 + k[1] ** 2) * np.abs(spectrum) ** 2)))
 
 
 def read_surface(path: str | Path) -> tuple[np.ndarray, tuple[float, float] | None]:
-    """Heights (nx, ny) of a measured surface, and its lengths along x and y where the file holds them.
+    """Read a measured rough surface from a file.
 
-    A `.npy` file and a table of numbers in text (`.txt`, `.csv`, `.asc`) hold the heights alone, with x along the rows. Files of
-    instruments are read by the package surfalize, if it is installed; their heights and lengths are in micrometres.
+    A `.npy` file and a table of numbers in text (`.txt`, `.csv`, `.asc`, `.dat`) hold the heights alone, with x along
+    the rows. Files of instruments are read by the package surfalize, if it is installed; their heights and lengths are
+    in micrometres.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    tuple
+        Heights (nx, ny), and the lengths along x and y, or None where the file does not hold them.
 
     Raises
     ------

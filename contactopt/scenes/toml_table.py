@@ -117,7 +117,23 @@ class Table:
 
 
 def read_table(path: Path) -> Table:
-    """The whole of a TOML file; InputError with the line where it is not TOML."""
+    """Read the whole of a TOML file.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    Table
+        Its table, in which every entry knows its line.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, if it is too long, or, with the line, if it is not TOML.
+    """
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "is no file that can be read" if path.exists() else "does not exist"
         raise InputError(f"scene file '{path}' {what}.")
@@ -140,7 +156,18 @@ def read_table(path: Path) -> Table:
 
 
 def lines_of(text: str) -> dict[Place, int]:
-    """Place of every entry of a valid TOML text -> its line, from 1."""
+    """Find the lines of the entries of a TOML text.
+
+    Parameters
+    ----------
+    text
+        A valid text.
+
+    Returns
+    -------
+    dict
+        For the place of every entry its line, from 1.
+    """
     tokens, line = [], 1
     for match in TOKEN.finditer(text):
         if match.lastgroup != "space":

@@ -25,13 +25,30 @@ def check_time() -> None:
 
 
 def time_left() -> float:
-    """Seconds until the time limit of the solve that runs, at least 0; infinite without a limit."""
+    """Tell how much time is left to the solve that runs.
+
+    Returns
+    -------
+    float
+        Seconds until its time limit, at least 0; infinite without a limit.
+    """
     return max(_deadline.get() - time.perf_counter(), 0.0)
 
 
 @contextmanager
 def until(moment: float) -> Iterator[None]:
-    """Set the deadline, a value of time.perf_counter(), for the `with` block; an earlier one of an outer solve stays."""
+    """Set the deadline for the `with` block. An earlier one of an outer solve stays.
+
+    Parameters
+    ----------
+    moment
+        The deadline, a value of time.perf_counter() [s].
+
+    Yields
+    ------
+    None
+        Nothing.
+    """
     token = _deadline.set(min(moment, _deadline.get()))
     try:
         yield

@@ -33,6 +33,8 @@ CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
 CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
 PROOF = 0.3, 5.0  # least and most seconds for the proof that a problem has no solution
+FAR = 0.1  # residual above which a method that has worked for long may be at a problem without a solution
+DOUBT = 1.0  # seconds of work after which the proof is first looked for; then after ten times as long, and so on
 SAME = 1e-11  # relative distance at which two iterates are the same state
 CONFIRM = 8  # repeated states in a row after which a method is not going anywhere; some change course before that
 
@@ -133,18 +135,20 @@ def _run(
     steps = method.iterate(scaled, None if start is None else _dimensionless_start(start, problem, scales))
     ended: Status | None = None
     message = ""
-    while ended is None:
+    proof, doubt = None, DOUBT
+    while ended is None and proof is None:
         begin = time.perf_counter()
         iterate, ended, message = _next(steps, recorder.left())
         recorder.clock += time.perf_counter() - begin
         if iterate is not None:
             ended = recorder.record(iterate, _counts(operator))
-    status = Status.SOLVED if recorder.residual <= tol else ended
-    proof = None
-    if status is not Status.SOLVED and recorder.residual > CLOSE:
+        if ended is None and recorder.residual > FAR and recorder.clock > doubt:
+            proof, doubt = infeasibility(problem, recorder.clock / 10), 10 * recorder.clock
+    status = Status.SOLVED if recorder.residual <= tol else ended or Status.INFEASIBLE
+    if proof is None and status is not Status.SOLVED and recorder.residual > CLOSE:
         proof = infeasibility(problem, float(np.clip(recorder.left(), *PROOF)))
-        if proof is not None:
-            message, status = proof.sentence, Status.INFEASIBLE
+    if proof is not None:
+        message, status = proof.sentence, Status.INFEASIBLE
     return Solution(
         recorder.reactions,
         recorder.multipliers,

@@ -15,7 +15,15 @@ _notes: ContextVar[list[str] | None] = ContextVar("notes of the solve that runs"
 
 
 def note(logger: logging.Logger, sentence: str) -> None:
-    """Log a sentence, and keep it for the Solution of the solve that runs; a sentence is kept once."""
+    """Log a sentence, and keep it for the Solution of the solve that runs. A sentence is kept once.
+
+    Parameters
+    ----------
+    logger
+        The logger of the module that speaks.
+    sentence
+        What was done otherwise than asked or expected.
+    """
     logger.info(sentence)
     notes = _notes.get()
     if notes is not None and sentence not in notes:
@@ -24,7 +32,13 @@ def note(logger: logging.Logger, sentence: str) -> None:
 
 @contextmanager
 def collected() -> Iterator[list[str]]:
-    """The list that grows by the notes made inside the `with` block."""
+    """Collect the notes that are made inside the `with` block.
+
+    Yields
+    ------
+    list
+        The sentences. The list grows while the block runs.
+    """
     notes: list[str] = []
     token = _notes.set(notes)
     try:

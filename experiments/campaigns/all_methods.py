@@ -15,12 +15,12 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
     ratio = (both["iterations"]["warm"] / both["iterations"]["cold"]).groupby("method").median().dropna()
     worst = kept[kept < 0.75]
     return [
-        f"Of {kept.size} methods on {table['problem'].nunique()} problems, {_names(every) or 'none'} certified every run; "
-        f"fewer than three quarters: "
-        + (", ".join(f"`{m}` {100 * s:.0f} %" for m, s in worst.items()) or "none")
+        f"Of {kept.size} methods on {table['problem'].nunique()} problems, {_names(every) or 'none'} certified every run. "
+        + "Fewer than three quarters of their runs were certified with: "
+        + (", ".join(f"`{m}` ({100 * s:.0f} %)" for m, s in worst.items()) or "none")
         + ".",
-        f"Counting a failure at the time limit, the least shifted geometric mean CPU time is that of `{overall.iloc[0]['method']}` "
-        f"({1e3 * overall.iloc[0]['shifted mean']:.2g} ms), then `{overall.iloc[1]['method']}` "
+        f"A failure counts as the time limit. The least shifted geometric mean CPU time is that of `{overall.iloc[0]['method']}` "
+        f"({1e3 * overall.iloc[0]['shifted mean']:.2g} ms). Then follow `{overall.iloc[1]['method']}` "
         f"({overall.iloc[1]['over the least']:.1f} times) and `{overall.iloc[2]['method']}` "
         f"({overall.iloc[2]['over the least']:.1f} times).",
         "A warm start from nine tenths of load and friction changes the median number of iterations by the factors "

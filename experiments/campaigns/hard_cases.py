@@ -11,12 +11,12 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
     decades = [round(np.log10(units[c].max() / units[c].min())) for c in ("problem.force", "problem.length")]
     varying = counts[counts > 1].index.tolist()
     return [
-        f"Units: {_share(units)} runs are certified over {decades[0]} decades of force and {decades[1]} of length; the number of iterations is the "
+        f"Units: {_share(units)} runs are certified over {decades[0]} decades of force and {decades[1]} of length. The number of iterations is the "
         f"same in all of them for {len(counts) - len(varying)} of {len(counts)} methods"
         + (f" (not for {', '.join(f'`{m}`' for m in varying)})." if varying else "."),
-        f"Redundant contacts: {_share(copies)} runs are certified, up to {copies['problem.copies'].max():.0f} copies; failures: {_failures(copies)}.",
-        f"Towards incompressibility {_share(nu)} runs are certified, the largest Poisson's ratio being {nu['problem.upper_nu'].max():g}; "
-        f"failures: {_failures(nu)}.",
+        f"Redundant contacts: {_share(copies)} runs are certified, up to {copies['problem.copies'].max():.0f} copies. Failures: {_failures(copies)}.",
+        f"Towards incompressibility {_share(nu)} runs are certified, and the largest Poisson's ratio is {nu['problem.upper_nu'].max():g}. "
+        f"Failures: {_failures(nu)}.",
     ]
 
 

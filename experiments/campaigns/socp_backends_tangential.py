@@ -16,15 +16,15 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
         f"Answers of the conic backends as they come keep the tolerance asked for in {100 * raw['success'].mean():.0f} % of "
         f"{len(raw)} runs ("
         + ", ".join(f"{name} {100 * share:.0f} %" for name, share in kept.items())
-        + f"); with active-set steps in {100 * exact['success'].mean():.0f} %.",
-        f"Projection and Newton methods on the same problems keep it in {100 * own['success'].mean():.0f} % of {len(own)} runs; "
-        f"where they fail: {_failures(own)}.",
+        + f"). With active-set steps they keep it in {100 * exact['success'].mean():.0f} %.",
+        f"Projection and Newton methods on the same problems keep it in {100 * own['success'].mean():.0f} % of {len(own)} runs. "
+        f"Failures: {_failures(own)}.",
         f"At 1e-6 `{mid.iloc[0]['method']}` has the least shifted geometric mean CPU time "
-        f"({1e3 * mid.iloc[0]['shifted mean']:.2g} ms); the best use of a conic backend is `{cone['method']}`, "
-        f"{cone['over the least']:.0f} times slower, cvxpy's compilation included.",
+        f"({1e3 * mid.iloc[0]['shifted mean']:.2g} ms). The best use of a conic backend is `{cone['method']}`. It "
+        f"takes {cone['over the least']:.0f} times as long, with cvxpy's compilation.",
     ]
 
 
 def _failures(rows) -> str:  # type: ignore[no-untyped-def]
     failed = rows[~rows["success"]].groupby(["method", "status"]).size()
-    return ", ".join(f"{n} of `{name}` ({status})" for (name, status), n in failed.items()) or "nowhere"
+    return ", ".join(f"{n} of `{name}` ({status})" for (name, status), n in failed.items()) or "none"

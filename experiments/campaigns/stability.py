@@ -11,14 +11,14 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
     between = alternating.drop(below.index).drop(above.index)
     lowest = elastic[~elastic["success"]].groupby("method")["problem.mu"].min().sort_values()
     return [
-        "On elastic bodies the methods certify, of their runs: "
+        "Of their runs on elastic bodies the methods certify: "
         + _shares(elastic)
         + ". The least friction coefficient at which "
         "one fails: " + (", ".join(f"{mu:g} (`{name}`)" for name, mu in lowest.items()) or "none") + ".",
-        f"The threshold known before solving holds and is not sharp: below it the alternating iteration is certified in "
-        f"{_share(below)} runs, between it and the upper bound in {_share(between)}, above that bound, where some load breaks it, "
-        f"still in {_share(above)} runs of these loads.",
-        "On rank-deficient rigid bodies: " + _shares(rigid) + ".",
+        f"The threshold that is known before solving holds, and is not sharp. Below it the alternating iteration is certified in "
+        f"{_share(below)} runs. Between it and the upper bound it is certified in {_share(between)} runs. Above that bound some load breaks it. With "
+        f"the loads of these problems it is still certified in {_share(above)} runs.",
+        "Of their runs on rank-deficient rigid bodies the methods certify: " + _shares(rigid) + ".",
     ]
 
 

@@ -1,11 +1,11 @@
 # %% [markdown]
 # # Chapter 1. A spring, a node and a floor
 #
-# The smallest contact problem has one unknown. It already shows everything that this course is about: an energy with a
-# constraint, its dual in forces, the optimality conditions that join them, a program that a solver can read, and several
-# ways to go wrong.
+# The smallest contact problem has one unknown. It already shows everything that this course is about: an energy that is
+# minimised under a constraint, a second problem in the contact forces, the conditions that join the two, a program that a
+# solver can read, and several ways to go wrong.
 #
-# You need: derivatives, and the idea of a minimum under a constraint. Time: 30 minutes with the exercises.
+# You need derivatives, and the idea of a minimum under a constraint. The chapter takes 30 minutes with its exercises.
 
 # %%
 import cvxpy as cp
@@ -20,7 +20,7 @@ from contactopt.teaching import Slider, check
 #
 # A node hangs on a spring of stiffness $k$ above a floor. Without load the gap between node and floor is $g_0$. A load $F$
 # pulls the node down. We call the gap that remains $u$, and the force of the floor on the node $r$. The normal $n$ points
-# out of the floor, upwards: $u$ and $r$ are positive in its direction.
+# out of the floor, that is, upwards. The gap $u$ and the force $r$ are positive in this direction.
 #
 # | letter | meaning | unit |
 # |---|---|---|
@@ -31,7 +31,9 @@ from contactopt.teaching import Slider, check
 # | $r \ge 0$ | force of the floor on the node, upwards | N |
 
 # %%
-k, g0, F = 2.0, 1.0, 5.0
+k, g0, F = 2.0, 1.0, 5.0  # N/mm, mm, N
+
+# %% tags=["hide-input"]
 
 
 def sketch(ax, u, r):
@@ -45,8 +47,10 @@ def sketch(ax, u, r):
         ax.annotate("", (x, y1), (x, y0), arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
         ax.text(x + 0.08, (y0 + y1) / 2, name, color=color)
     ax.annotate("", (1.1, u), (1.1, 0), arrowprops={"arrowstyle": "<->", "color": "C2"})
-    ax.text(1.15, u / 2, f"$u$ = {u:.1f} mm", color="C2", va="center")
-    ax.set(xlim=(-1.2, 2.2), ylim=(-0.7, 3.2), aspect="equal")
+    ax.text(1.15, max(u / 2, 0.25), f"$u$ = {u:.1f} mm", color="C2", va="center")
+    ax.annotate("", (-1.3, 0.8), (-1.3, 0), arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8})
+    ax.text(-1.22, 0.6, "$n$")
+    ax.set(xlim=(-1.5, 2.2), ylim=(-0.7, 3.2), aspect="equal")
     ax.axis("off")
 
 
@@ -57,14 +61,18 @@ sketch(ax, 1.0, 0.0)
 # ## The primal problem: an energy in displacements
 #
 # The spring stores the energy $\tfrac12 k (u - g_0)^2$. The load does work when the node moves down, so its potential is
-# $+F u$. The node goes where the sum is smallest, as long as the floor lets it:
+# $+F u$. The node goes to the place where the sum of both is smallest, among all places above the floor:
 #
 # $$ \min_{u \ge 0} \; E(u), \qquad E(u) = \tfrac12 k\,(u - g_0)^2 + F u . $$
 #
-# The derivative $E'(u) = k (u - g_0) + F$ is the force that is missing for equilibrium. The floor supplies it. This is the
-# meaning of the *multiplier* of the constraint $u \ge 0$: it is the contact force,
+# This is the *primal* problem. The derivative $E'(u) = k (u - g_0) + F$ is the force that is missing for equilibrium, and
+# the floor supplies it. Solvers call this number the *Lagrange multiplier* of the constraint $u \ge 0$. For us it is the
+# contact force:
 #
 # $$ r = E'(u) = k\,(u - g_0) + F . $$
+#
+# The Python package `cvxpy` reads such a problem nearly as it is written on paper. A constraint has its multiplier as
+# `dual_value`.
 
 # %%
 u = cp.Variable()
@@ -79,19 +87,21 @@ assert np.isclose(floor.dual_value, F - k * g0, atol=1e-4)
 # %% [markdown]
 # ## The optimality conditions
 #
-# Karush, Kuhn and Tucker's conditions of this program are *Signorini's conditions* and equilibrium:
+# A minimum under constraints obeys the conditions of Karush, Kuhn and Tucker, the *KKT conditions* for short. Here they
+# are the equilibrium of the node, and three conditions that are named after Signorini:
 #
 # $$ r = k\,(u - g_0) + F, \qquad u \ge 0, \qquad r \ge 0, \qquad u\, r = 0 . $$
 #
-# Read them aloud. The node does not pass through the floor. The floor pushes and never pulls. Where there is a gap there is
-# no force, and where there is a force there is no gap. Move the slider, and watch which of $u$ and $r$ is zero.
+# In words: the forces on the node balance. The node does not pass through the floor. The floor pushes, and never pulls.
+# If there is a gap, there is no force, and if there is a force, there is no gap. Move the slider, and watch which of $u$
+# and $r$ is zero.
 
 
-# %%
+# %% tags=["hide-input"]
 def state(load):
     gap = max(g0 - load / k, 0.0)
     force = max(load - k * g0, 0.0)
-    fig, (left, right) = plt.subplots(1, 2, figsize=(7, 3.4), layout="constrained")
+    fig, (left, right) = plt.subplots(1, 2, figsize=(6.0, 3.2), layout="constrained")
     sketch(left, gap, force)
     w = np.linspace(-1, 2, 200)
     right.plot(w, k * (w - g0) ** 2 / 2 + load * w, "C0")
@@ -110,14 +120,15 @@ Slider("load F [N]", np.linspace(0, 5, 11), state, start=10)
 #
 # $$ u = Q\,r + q, \qquad Q = 1/k, \qquad q = g_0 - F/k . $$
 #
-# $Q$ is the *compliance* of the body, and $q$ is the gap that the node would have if the floor were not there; a negative $q$
-# means that it would pass through. Signorini's conditions now say that $r \ge 0$, that $Q r + q \ge 0$, and that one of both
-# is zero. They are the optimality conditions of
+# $Q$ is the *compliance* of the spring. $q$ is the gap that the node would have if the floor were not there. A negative $q$
+# means that the node would pass through the floor. Signorini's conditions now say that $r \ge 0$, that $Q r + q \ge 0$, and
+# that at least one of the two is zero. These are the KKT conditions of another minimum:
 #
 # $$ \min_{r \ge 0} \; \tfrac12 Q\, r^2 + q\, r . $$
 #
-# What was the unknown has become the multiplier, and what was the multiplier has become the unknown. This dual problem is
-# the one that contactopt solves, because later its unknowns live on the contact surface alone.
+# This is the *dual* problem. The force $r$, which was the multiplier, has become the unknown. The gap $u$, which was the
+# unknown, has become the multiplier. contactopt solves the dual problem. For large bodies its unknowns live on the contact
+# surface alone, and are few.
 
 # %%
 Q, q = 1 / k, g0 - F / k
@@ -128,13 +139,13 @@ dual.solve(solver=cp.CLARABEL)
 print(f"force r = {r.value:.4f} N, multiplier u = {push.dual_value:.4f} mm")
 
 assert np.isclose(r.value, F - k * g0, atol=1e-4)
-assert np.isclose(
-    primal.value + dual.value, F * g0 - F**2 / (2 * k), atol=1e-4
-)  # up to the sign and a constant they are equal
+# up to the sign and a constant the two minima are equal
+assert np.isclose(primal.value + dual.value, F * g0 - F**2 / (2 * k), atol=1e-4)
 
 # %% [markdown]
-# contactopt solves the same problem. It wants one row of $q$ per contact, with a normal and a tangential component. Our
-# node does not move sideways, so the tangential entries are zero.
+# contactopt solves the same problem. It takes one row of $q$ for each contact, with the normal component first and the
+# tangential one second. Our node is not pulled sideways, so the tangential entry of $q$ is zero. The last argument is the
+# friction coefficient.
 
 # %%
 problem = InterfaceProblem(np.diag([Q, Q]), [[q, 0.0]], 0.0)
@@ -150,32 +161,38 @@ assert answer.solved and np.allclose(answer.reactions, [[3.0, 0.0]])
 #
 # $$ \min_u \; E(u) + \tfrac12 \kappa \min(u, 0)^2 . $$
 #
-# The program has no constraint any more, but the node sinks in: where it touches, $u = -(F - k g_0) / (k + \kappa)$. A
-# larger $\kappa$ reduces this error. It also makes the stiffness of the system jump by the factor $1 + \kappa / k$ when
-# contact begins, which is what makes large penalty problems hard to solve.
+# This program has no constraint any more, but the node sinks into the floor. If the load is large enough to close the gap,
+# $F > k g_0$, the minimum is at $u = -(F - k g_0) / (k + \kappa)$. A larger $\kappa$ makes this error smaller. But when
+# contact begins, the stiffness of the system jumps by the factor $1 + \kappa / k$. Such jumps make large penalty problems
+# hard to solve.
 #
-# ## Nitsche: consistent without a multiplier
+# ## Nitsche: exact without a multiplier
 #
-# Nitsche's method also has the displacement as its only unknown. It uses that the contact force is known as soon as the
-# displacement is: it is the residual $r(u) = k (u - g_0) + F$. Signorini's conditions are the same as the one equation
-# $r = [\,r - \gamma u\,]_+$ for any $\gamma > 0$, where $[x]_+ = \max(x, 0)$. The method minimises
+# Nitsche's method also has the displacement as its only unknown. It uses that the displacement determines the contact
+# force: by equilibrium, $r(u) = k (u - g_0) + F$. With the notation $[x]_+ = \max(x, 0)$, Signorini's conditions are the
+# same as the one equation $r = [\,r - \gamma u\,]_+$, for any number $\gamma > 0$. The method minimises
 #
 # $$ E(u) - \frac{1}{2\gamma} r(u)^2 + \frac{1}{2\gamma} [\,r(u) - \gamma u\,]_+^2 . $$
 #
-# Its derivative is $(1 - k/\gamma)\,\bigl(r - [r - \gamma u]_+\bigr)$. So it vanishes exactly at the solution, for every
-# $\gamma$ but $\gamma = k$: the method is *consistent*, while the penalty method is not. But there is a price: the function
-# is convex only if $\gamma > k$. Below, it has no minimum.
+# The derivative of this function is $(1 - k/\gamma)\,\bigl(r - [r - \gamma u]_+\bigr)$. For every $\gamma$ but $\gamma = k$ it is
+# zero exactly at the solution. Such a method is called *consistent*. (The penalty method is not: its minimum is another
+# point.) There is a price. The function is convex only if $\gamma > k$. For a smaller $\gamma$ it has no minimum.
 #
 # ## Proximal Galerkin: never below the floor
 #
-# The youngest of the four methods writes the gap as $u = e^{\psi}$ with a *latent variable* $\psi$. A gap of this form is
-# always positive. The energy is minimised in steps; each step adds the distance from the last gap, measured by the
-# entropy. The condition of one step with the step size $\alpha$ is
+# The youngest of the four methods writes the gap as $u = e^{\psi}$, with a *latent variable* $\psi$. A gap of this form is
+# always positive. The method goes in steps. Each step minimises the energy $E(u)$ together with a term that keeps $u$ near
+# the last gap $u_{\text{last}}$:
+#
+# $$ \min_{u > 0} \; \alpha\, E(u) + u \ln \frac{u}{u_{\text{last}}} - u + u_{\text{last}} . $$
+#
+# The number $\alpha$ is the step size. The added term is a distance that is measured by the entropy. The derivative of the
+# whole is zero if
 #
 # $$ \alpha\, E'(e^{\psi}) + \psi - \psi_{\text{last}} = 0 . $$
 #
-# At contact every step multiplies the gap by about $e^{-\alpha r}$, and $(\psi_{\text{last}} - \psi) / \alpha$ tends to the
-# contact force. We compare the four methods.
+# If the node touches, every step multiplies the gap by about $e^{-\alpha r}$. The number $(\psi_{\text{last}} - \psi) / \alpha$
+# tends to the contact force. Now we compare the methods on our node.
 
 
 # %%
@@ -210,7 +227,7 @@ cp.Problem(nitsche).solve(solver=cp.CLARABEL)
 print(f"Nitsche: gap {v.value:.1e} mm, force {residual_force(v.value):.4f} N")
 print(f"proximal Galerkin after 6 steps: gap {gaps[-1]:.1e} mm, force {forces[-1]:.4f} N")
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 left.loglog(stiffness / k, -sunk, "o-")
 left.set(xlabel=r"penalty stiffness $\kappa / k$ [-]", ylabel="depth below the floor [mm]", title="penalty")
 right.semilogy(range(1, 7), gaps, "s-", color="C1")
@@ -221,41 +238,47 @@ assert np.all(np.array(gaps) > 0) and np.isclose(forces[-1], 3.0, rtol=1e-2)
 assert np.isclose(sunk[-1] * stiffness[-1], -3.0, rtol=1e-4)
 
 # %% [markdown]
-# | method | unknowns | error | fails when |
+# The table sums up the four methods.
+#
+# | method | unknowns | error | it fails if |
 # |---|---|---|---|
 # | multiplier (the programs above) | $u$ and $r$ | none | the problem has no solution |
-# | penalty | $u$ | penetration $\sim 1/\kappa$ | $\kappa$ is so large that rounding takes over |
-# | Nitsche | $u$ | none | $\gamma$ is smaller than the stiffness |
-# | proximal Galerkin | $\psi$ | gap $\sim e^{-\alpha r \cdot \text{steps}}$ | contact with $r = 0$: the gap falls only slowly |
+# | penalty | $u$ | the node sinks in, in proportion to $1/\kappa$ | $\kappa$ is so large that rounding errors take over |
+# | Nitsche | $u$ | none | $\gamma$ is smaller than the stiffness $k$ |
+# | proximal Galerkin | $\psi$ | a gap remains, which falls like $e^{-\alpha r \cdot \text{steps}}$ | the node touches with $r = 0$: then the gap falls only slowly |
 #
 # ## What fails: a body that nothing holds
 #
-# Cut the spring, $k = 0$, and pull the node up, $F = -1$. The energy $F u$ falls for ever as the gap grows: the primal problem
-# is *unbounded*. The dual problem has to carry the load by a force $r = F$ that may not be negative: it is *infeasible*. Both
-# words say that the node flies away.
+# Cut the spring, so that $k = 0$, and pull the node up with $F = -1$ N. The energy $F u$ falls for ever as the gap grows. A
+# solver says that the primal problem is *unbounded*. In the dual problem, equilibrium asks for $r = F = -1$ N. But the
+# contact force may not be negative. A solver says that the dual problem is *infeasible*. Both words mean that the node flies
+# away.
 
 # %%
-free = cp.Variable(nonneg=True)
-unbounded = cp.Problem(cp.Minimize(-1.0 * free))
-unbounded.solve(solver=cp.CLARABEL)
-print(unbounded.status)
+gap, force = cp.Variable(nonneg=True), cp.Variable(nonneg=True)
+primal_without_spring = cp.Problem(cp.Minimize(-1.0 * gap))
+dual_without_spring = cp.Problem(cp.Minimize(0.0), [force == -1.0])
+for program in (primal_without_spring, dual_without_spring):
+    program.solve(solver=cp.CLARABEL)
+print(f"primal: {primal_without_spring.status}, dual: {dual_without_spring.status}")
 
-assert unbounded.status == "unbounded"
+assert primal_without_spring.status == "unbounded" and dual_without_spring.status == "infeasible"
 
 # %% [markdown]
 # ## Exercises
 #
-# Replace `...` by your answer and run the cell; it grades itself. The first two need pen and paper only.
+# Replace `...` by your answer, and run the cell and the one below it, which grades your answer. The first two exercises need
+# pen and paper only.
 #
-# **1.1** A spring of stiffness 4 N/mm holds a node .5 mm above the floor. A load of 5 N pulls it down. How large are the gap
+# **1.1** (Pen and paper.) A spring of stiffness 4 N/mm holds a node 0.5 mm above the floor. A load of 5 N pulls it down. How large are the gap
 # and the contact force?
 
 # %% tags=["exercise"]
 answer = (..., ...)  # gap [mm], force [N]
 
 # %% [markdown] tags=["solution"]
-# The spring would let the node sink by $5/4 = 1.25$ mm, more than .5 mm. So it touches, $u = 0$, and
-# $r = F - k g_0 = 5 - 2 = 3$ N.
+# The spring would let the node sink by $5/4 = 1.25$ mm, which is more than 0.5 mm. So the node touches the floor, $u = 0$,
+# and the contact force is $r = F - k g_0 = 5 - 2 = 3$ N.
 
 # %% tags=["solution"]
 answer = (0.0, 3.0)
@@ -264,14 +287,14 @@ answer = (0.0, 3.0)
 check("1.1", answer if ... not in answer else ..., (0.0, 3.0))
 
 # %% [markdown]
-# **1.2** For which load does the node of 1.1 just touch the floor?
+# **1.2** (Pen and paper.) For which load does the node of exercise 1.1 just touch the floor?
 
 # %% tags=["exercise"]
 answer = ...  # N
 
 # %% [markdown] tags=["solution"]
-# The gap $g_0 - F / k$ is zero at $F = k g_0 = 2$ N. The contact force is zero there too: both members of the pair are zero.
-# Such a contact is called *weakly active*.
+# The gap $g_0 - F / k$ is zero at $F = k g_0 = 2$ N. The contact force is zero there too. A contact whose gap and force are
+# both zero is called *weakly active*.
 
 # %% tags=["solution"]
 answer = 4 * 0.5
@@ -280,8 +303,8 @@ answer = 4 * 0.5
 check("1.2", answer, 2.0)
 
 # %% [markdown]
-# **1.3** Hang a ceiling 2 mm above the floor, so that $0 \le u \le 2$. Pull the node of this chapter ($k = 2$, $g_0 = 1$)
-# *up*, with $F = -5$. Write the primal program in cvxpy. Which force does the ceiling exert?
+# **1.3** Hang a ceiling 2 mm above the floor, so that $0 \le u \le 2$. Pull the node of this chapter ($k = 2$ N/mm,
+# $g_0 = 1$ mm) *up*, with $F = -5$ N. Write the primal program in cvxpy. How large is the force of the ceiling?
 
 # %% tags=["exercise"]
 answer = ...  # N, positive
@@ -299,14 +322,15 @@ answer = float(ceiling.dual_value)
 check("1.3", answer, 3.0)
 
 # %% [markdown]
-# **1.4** How stiff must the penalty spring be, so that the node of this chapter sinks in by .01 mm only? How many times as
-# stiff as the spring is it?
+# **1.4** How stiff must the penalty spring be, so that the node of this chapter sinks only 0.01 mm into the floor? Give its
+# stiffness as a multiple of the stiffness $k$ of the spring.
 
 # %% tags=["exercise"]
 answer = ...  # kappa / k [-]
 
 # %% [markdown] tags=["solution"]
-# $(F - k g_0) / (k + \kappa) = 3 / (2 + \kappa) = 0.01$ gives $\kappa = 298$ N/mm, 149 times the spring's stiffness.
+# The depth is $(F - k g_0) / (k + \kappa) = 3 / (2 + \kappa) = 0.01$ mm. This gives $\kappa = 298$ N/mm, which is 149 times
+# the stiffness of the spring.
 
 # %% tags=["solution"]
 answer = (3 / 0.01 - k) / k

@@ -1,10 +1,12 @@
 # %% [markdown]
 # # Chapter 3. A string on a floor: many nodes
 #
-# A heavy string sags until it lies on a floor. Now the question is *where* it touches. The programs of chapter 1 stay the
-# same; the numbers become vectors and matrices. This obstacle problem has an exact solution, so we can measure errors.
+# A heavy string sags until it lies on a floor. The question is now *where* it touches the floor. The programs of chapter 1
+# stay the same, but their numbers become vectors and matrices. This problem has an exact solution, so we can measure the
+# errors of every method.
 #
-# You need: chapter 1, and the idea of finite differences or finite elements. Time: 40 minutes with the exercises.
+# You need chapter 1, and the idea of finite differences or finite elements. The chapter takes 40 minutes with its
+# exercises.
 
 # %%
 import cvxpy as cp
@@ -18,15 +20,45 @@ from contactopt.teaching import Slider, check
 # ## The mechanical system
 #
 # A string of length $L$ and tension $T$ is fixed at both ends, at the height $d$ above a floor. Its weight per length is
-# $f$. We divide it into $N$ elements of the length $h$, and call the gap at node $i$ between string and floor $u_i$, and the
-# force of the floor on this node $r_i$, upwards.
+# $f$. We divide the string into $N$ elements of the length $h = L / N$. The gap between node $i$ and the floor is $u_i$. The
+# force of the floor on node $i$ is $r_i$. Both are positive in the direction of the normal $n$, upwards. There is no
+# friction in this chapter, so each node has a normal component only.
 
 # %%
 L, T, f, d = 1.0, 1.0, 8.0, 0.25  # mm, N, N/mm, mm
 
+# %% tags=["hide-input"]
+fig, ax = plt.subplots(figsize=(6.4, 3.0), layout="constrained")
+ax.axhspan(-0.07, 0, color="0.8", lw=0)
+ax.axhline(0, color="k", lw=1)
+places = np.linspace(0, L, 17)
+sag = 4 * np.maximum(0.25 - np.minimum(places, L - places), 0) ** 2
+ax.plot(places, sag, "C0o-", ms=4)
+ax.plot([0, L], [0.25, 0.25], "ks", ms=8)
+for tail, head, name, color, at in (
+    ((2 / 16, 0.22), (2 / 16, 0.08), "weight $f h$", "C3", (0.14, 0.19)),
+    ((0.5, -0.065), (0.5, -0.005), "$r_i$", "C1", (0.515, -0.055)),
+    ((-0.1, 0), (-0.1, 0.1), "$n$", "k", (-0.085, 0.08)),
+    ((0, 0.25), (-0.09, 0.25), "$T$", "k", (-0.07, 0.265)),
+    ((L, 0.25), (L + 0.09, 0.25), "$T$", "k", (L + 0.05, 0.265)),
+):
+    ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
+    ax.text(*at, name, color=color)
+for x_at, top, name, at in ((0.0, 0.25, "$d$", (0.012, 0.03)), (15 / 16, sag[15], "$u_i$", (0.95, 0.05))):
+    ax.annotate("", (x_at, top), (x_at, 0), arrowprops={"arrowstyle": "<->", "color": "C2"})
+    ax.text(*at, name, color="C2")
+ax.set(xlim=(-0.15, L + 0.15), ylim=(-0.075, 0.3))
+_ = ax.axis("off")
 
+# %% [markdown]
+# We put the stiffness of the string into a matrix $A$. Its row for node $i$ is $\tfrac{T}{h} (2 u_i - u_{i-1} - u_{i+1})$,
+# the force with which the tension resists the kink at the node. The weight of node $i$ is $w_i = f h$. Without the floor the
+# gaps would be $q = d - A^{-1} w$. The compliance is $Q = A^{-1}$.
+
+
+# %%
 def string(N):
-    """Stiffness A, free gap q = d - A^-1 f h, and places x of the inner nodes."""
+    """Stiffness A [N/mm], weights w [N] and places x [mm] of the inner nodes."""
     h = L / N
     A = T / h * (2 * np.eye(N - 1) - np.eye(N - 1, k=1) - np.eye(N - 1, k=-1))
     weight = np.full(N - 1, f * h)
@@ -38,7 +70,11 @@ Q = np.linalg.inv(A)
 q = d - Q @ weight
 
 # %% [markdown]
-# ## Primal, dual, and what joins them
+# ## Primal and dual
+#
+# The string takes the shape of least energy among all shapes above the floor (primal). The forces are the minimum of another
+# function (dual). In these programs $u$, $r$, $w$ and $q$ are vectors with one number for each inner node. The difference
+# $u - d$ says how high the nodes are relative to the ends; it is negative where the string sags.
 #
 # | | primal | dual |
 # |---|---|---|
@@ -46,8 +82,14 @@ q = d - Q @ weight
 # | program | $\min_{u \ge 0} \tfrac12 (u - d)' A (u - d) + w' u$ | $\min_{r \ge 0} \tfrac12 r' Q r + q' r$ |
 # | multiplier of the constraint | $r = A (u - d) + w$ | $u = Q r + q$ |
 #
-# Here $w$ is the weight of each node, $Q = A^{-1}$ and $q = d - Q w$. Both programs have the optimality conditions
-# $u \ge 0$, $r \ge 0$ and $u_i r_i = 0$ at every node.
+# ## The optimality conditions
+#
+# Both programs have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They are equilibrium,
+# and Signorini's conditions at every node:
+#
+# $$ u = Q\, r + q, \qquad u_i \ge 0, \qquad r_i \ge 0, \qquad u_i\, r_i = 0 . $$
+#
+# Here are both in `cvxpy`. The multipliers of one program are the unknowns of the other:
 
 # %%
 u = cp.Variable(len(x))
@@ -64,12 +106,13 @@ assert np.allclose(r.value, floor.dual_value, atol=1e-3)
 # %% [markdown]
 # ## The exact solution
 #
-# Where the string hangs freely it is a parabola, $u'' = f / T$. It leaves the floor without a kink, at the distance $a$ from
-# the end. So $u = \tfrac{f}{2T} (a - x)^2$, and the height at the end gives
+# Where the string hangs freely, it is a parabola, because $u'' = f / T$. It leaves the floor without a kink, at the distance
+# $a$ from the end. So near the left end $u = \tfrac{f}{2T} (a - x)^2$. At the end itself, $x = 0$, the height is $d$:
 #
 # $$ d = \frac{f a^2}{2 T}, \qquad a = \sqrt{2 T d / f} . $$
 #
-# On the floor the string is straight, so the floor carries exactly the weight: $r_i = f h$.
+# On the floor the string is straight, so its tension carries nothing. There the floor carries exactly the weight:
+# $r_i = f h$.
 
 
 # %%
@@ -79,19 +122,23 @@ def exact(height, places):
 
 
 truth, a = exact(d, x)
-fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 left.plot(x, u.value, "C0.", label="computed")
 left.plot(x, truth, "k-", lw=1, label="exact")
 left.set(xlabel="x [mm]", ylabel="gap [mm]")
 left.legend(frameon=False)
 right.plot(x, r.value * 40 / L, "C1.")
-right.axhline(f, color="k", lw=1)
-right.set(xlabel="x [mm]", ylabel="force of the floor per length [N/mm]")
+right.axhline(f, color="k", lw=1, label="weight $f$")
+right.set(xlabel="x [mm]", ylabel="floor's force per length [N/mm]")
+right.legend(frameon=False, loc="lower center")
 
 assert np.isclose(a, 0.25) and np.abs(u.value - truth).max() < 1e-3
 
+# %% [markdown]
+# The slider moves the ends up and down. If they are high enough, the string hangs freely.
 
-# %%
+
+# %% tags=["hide-input"]
 def lowered(height):
     fig, ax = plt.subplots(figsize=(5.5, 2.8), layout="constrained")
     line = np.linspace(0, L, 201)
@@ -113,9 +160,13 @@ Slider("height of the ends d [mm]", np.linspace(0, 1.25, 11), lowered, start=2)
 # %% [markdown]
 # ## Newton's method: guess the contact set
 #
-# If we knew which nodes touch, we would only have to solve a linear system: $u_i = 0$ there, and $r_i = 0$ elsewhere. The
-# *primal-dual active set method* guesses the set, solves, and corrects: a node belongs to the new set if $r_i - \rho u_i > 0$.
-# This is Newton's method for the equations $r = [\,r - \rho u\,]_+$, although these equations have kinks.
+# If we knew which nodes touch the floor, we would only have to solve a linear system: $u_i = 0$ at these nodes, and $r_i = 0$
+# at all others. The *primal-dual active set method* guesses the set of nodes that touch, solves the linear system, and
+# corrects the guess. A node belongs to the new set if $r_i - \rho u_i > 0$, where $\rho$ is any positive stiffness. The
+# method ends when the set stays as it is.
+#
+# Signorini's conditions are the same as the equations $r_i = [\,r_i - \rho u_i\,]_+$ with $[x]_+ = \max(x, 0)$. These equations
+# have kinks, but Newton's method can be applied to them, and it is exactly the active set method.
 
 
 # %%
@@ -143,14 +194,17 @@ assert np.allclose(active_set(Q, q)[0], r.value, atol=1e-3)
 assert counts[320] <= 320 / 4
 
 # %% [markdown]
-# The number of steps grows with the number of nodes: from a far guess the set shrinks only node by node at its edge. A start
-# from a coarser mesh cures that, and contactopt does so on large problems.
+# The number of steps grows with the number of nodes. If the first guess is far from the answer, the set shrinks only by a few
+# nodes at its edge in every step. A start from the answer on a coarser mesh cures this (exercise 3.4). contactopt does so on
+# large problems.
 #
 # ## Penalty and proximal Galerkin once more
 #
-# Both methods of chapter 1 work for vectors too. The penalty method adds a spring $\kappa$ per length below the floor. The
-# proximal Galerkin method writes $u_i = e^{\psi_i}$ and solves, in each step, $\alpha\,(A (e^\psi - d) + w) + h (\psi -
-# \psi_{\text{last}}) = 0$ by Newton's method.
+# Both methods of chapter 1 work for vectors too. The penalty method puts springs of the stiffness $\kappa$ per length below
+# the floor. The proximal Galerkin method writes the gap at every node as $u_i = e^{\psi_i}$. Each of its steps solves these
+# equations by Newton's method:
+#
+# $$ \alpha\,\bigl(A (e^\psi - d) + w\bigr) + h\, (\psi - \psi_{\text{last}}) = 0 . $$
 
 # %%
 h = L / 40
@@ -183,7 +237,7 @@ def proximal_galerkin(steps, alpha=0.1):
 stiffness = 10.0 ** np.arange(2, 7)
 depths = [-penalty(kappa).min() for kappa in stiffness]
 gap, errors = proximal_galerkin(25)
-fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
+fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 left.loglog(stiffness, depths, "o-")
 left.set(xlabel=r"penalty stiffness $\kappa$ [N/mm$^2$]", ylabel="largest depth [mm]", title="penalty")
 right.semilogy(range(1, 26), errors, "s-", color="C1", label="against the exact string")
@@ -193,13 +247,14 @@ assert np.isclose(depths[-1] * stiffness[-1], f, rtol=0.05)  # the springs carry
 assert gap.min() > 0 and errors[-1] < 5e-3
 
 # %% [markdown]
-# The penalised string sinks in by $f / \kappa$, as deep as a bed of springs under its weight. The string of the proximal
-# method never touches the floor, and comes closer in every step.
+# The string of the penalty method sinks into the floor by $f / \kappa$, as deep as a bed of springs gives way under its weight.
+# The string of the proximal method never touches the floor, and comes closer in every step.
 #
 # ## What fails
 #
-# **Deciding from a loose answer.** An interior-point method ends with small positive numbers everywhere. Whether a node
-# touches must be decided by comparing $r_i$ with $u_i$, each in its own scale, and not by `r > 0`.
+# **A decision from a rough answer is wrong.** The solver that we use here is an interior-point method. Its answers have a small
+# positive force at every node. So we cannot ask `r > 0` to find out which nodes touch. Instead we compare $r_i$ with $u_i$,
+# each in its own scale.
 
 # %%
 loose = cp.Variable(len(x))
@@ -210,9 +265,10 @@ print("nodes with r > 0:", int(np.sum(loose.value > 0)), "; nodes that touch:", 
 assert np.sum(loose.value > 0) != np.sum(active_set(Q, q)[0] > 0)
 
 # %% [markdown]
-# **Conditioning.** The condition number of $Q$ grows like $N^2$ for a string, because its compliance divides a wave by the
-# *square* of its wave number. On the surface of a solid body the compliance divides by the wave number itself, and the
-# condition grows like $N$ only. Chapter 6 makes use of that.
+# **Fine meshes are badly conditioned.** The condition number of $Q$ is the ratio of its largest to its smallest eigenvalue.
+# Iterative methods become slow when it is large. For a string it grows like $N^2$, because the compliance divides a wave of
+# force by the *square* of its wave number. On the surface of a solid body the compliance divides by the wave number itself,
+# so that the condition number grows like $N$ only. Chapter 6 makes use of this.
 
 # %%
 conditions = {N: np.linalg.cond(string(N)[0]) for N in (20, 40, 80)}
@@ -223,7 +279,8 @@ assert np.isclose(conditions[80] / conditions[40], 4, rtol=0.02)
 # %% [markdown]
 # ## Exercises
 #
-# **3.1** (Pen and paper.) The ends are only .09 mm above the floor. Where does the contact begin?
+# **3.1** (Pen and paper.) The ends of the string are only 0.09 mm above the floor. At which distance from the end does the
+# contact begin?
 
 # %% tags=["exercise"]
 answer = ...  # distance from the end [mm]
@@ -238,13 +295,13 @@ answer = 0.15
 check("3.1", answer, 0.15)
 
 # %% [markdown]
-# **3.2** (Pen and paper.) Which part of the weight does the floor carry then?
+# **3.2** (Pen and paper.) Which part of the weight does the floor carry in exercise 3.1?
 
 # %% tags=["exercise"]
 answer = ...  # between 0 and 1
 
 # %% [markdown] tags=["solution"]
-# The floor carries the weight of the part that lies on it, $(L - 2 a) / L = 0.7$.
+# The floor carries the weight of the part that lies on it. This part is $(L - 2 a) / L = 0.7$.
 
 # %% tags=["solution"]
 answer = 0.7
@@ -253,8 +310,8 @@ answer = 0.7
 check("3.2", answer, 0.7)
 
 # %% [markdown]
-# **3.3** A round hill rises from the floor, of the height $0.2 \, (1 - ((x - 0.5) / 0.2)^2)$ mm where that is positive. The
-# ends stay at $d = 0.25$ mm. Change $q$ and solve for the 39 forces. The certificate grades them.
+# **3.3** A round hill rises from the floor. Its height is $0.2 \, (1 - ((x - 0.5) / 0.2)^2)$ mm where this number is positive.
+# The ends of the string stay at $d = 0.25$ mm. Change $q$ and solve for the 39 forces. The certificate grades them.
 
 # %% tags=["exercise"]
 answer = ...  # 39 forces [N]
@@ -269,7 +326,7 @@ answer = active_set(Q, q - hill)[0]
 
 # %%
 def frictionless(Q, q):
-    """The interface problem of forces r_n alone: tangential components get the same compliance, and no friction."""
+    """An interface problem in the forces r_n alone: tangential components get the same compliance, and no friction."""
     return InterfaceProblem(np.kron(Q, np.eye(2)), np.column_stack([q, np.zeros(len(q))]), 0.0)
 
 
@@ -278,8 +335,8 @@ given = answer if answer is ... else np.column_stack([answer, np.zeros(len(x))])
 check("3.3", given, hill_problem)
 
 # %% [markdown]
-# **3.4** Newton's method above starts with all nodes in contact. Start it on 320 elements from the contact set of 160
-# elements. How many steps does it take? (`np.repeat` or `np.interp` carry a set to the finer mesh.)
+# **3.4** The active set method above starts with the guess that all nodes touch. On 320 elements, start it from the set that
+# it found on 160 elements. How many steps does it take? (`np.repeat` or `np.interp` carry a set to the finer mesh.)
 
 # %% tags=["exercise"]
 answer = ...  # number of steps

@@ -1,11 +1,11 @@
 # %% [markdown]
 # # Chapter 4. From bodies to the interface
 #
-# A real body has thousands of unknowns, and only those on its surface can touch anything. In this chapter finite elements
-# make the stiffness of a block. We eliminate everything that cannot touch. What remains is a small problem of the form that
-# you know: $u = Q r + q$.
+# A real body has thousands of unknowns, and only those on its surface can touch anything. In this chapter we compute the
+# stiffness of a block by finite elements. Then we eliminate all unknowns that cannot touch the floor. What remains is a
+# small problem of the form that you know: $u = Q r + q$.
 #
-# You need: chapters 1 to 3, and what a finite element is. Time: 50 minutes with the exercises.
+# You need chapters 1 to 3, and you should know what a finite element is. The chapter takes 50 minutes with its exercises.
 
 # %%
 import cvxpy as cp
@@ -18,14 +18,18 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from contactopt import InterfaceProblem, Material, Part, Rigid, Scene, Traction, natural_map_residual, reduce, solve
 from contactopt.problem.laws.tresca import Tresca
-from contactopt.teaching import check
+from contactopt.teaching import Slider, check
 
 # %% [markdown]
 # ## The mechanical system
 #
-# A block of rubber, 4 mm wide and 2 mm high, hangs on a rigid plate. The plate comes down by .1 mm, onto a rigid floor that
-# is slightly round: the gap is $x^2 / 20$ mm. The block is long in the third direction, so it is in plane strain, and all
-# forces are those of a slice of 1 mm.
+# A block of rubber, 4 mm wide and 2 mm high, hangs on a rigid plate. The plate comes down by 0.1 mm, onto a rigid floor that
+# is slightly round: before the plate moves, the gap at the place $x$ is $g(x) = x^2 / 20$ mm. The block is long in the third
+# direction. So it is in plane strain, and all forces are those of a slice of 1 mm.
+#
+# The normal $n$ points out of the floor, upwards, and the tangent $t$ points to the right. (The floor is so flat that we take
+# the same $n$ everywhere.) As before, $r$ is the force on the upper body, here the block, and every contact has its normal
+# component first.
 
 # %%
 E, nu, lowered = 5.0, 0.3, 0.1  # MPa, -, mm
@@ -42,27 +46,35 @@ U_top[top.all(["u^2"])] = -lowered
 x = mesh.p[0, bottom.nodal_ix]
 gap = x**2 / 20
 
+print(f"{basis.N} unknowns, {len(held)} held, {len(x)} nodes on the contact surface")
+
+assert np.abs(K - K.T).max() < 1e-12
+
+# %% tags=["hide-input"]
 fig, ax = plt.subplots(figsize=(6, 3.6), layout="constrained")
 ax.triplot(*mesh.p, mesh.t.T, color="C0", lw=0.4)
 line = np.linspace(-2.4, 2.4, 101)
 ax.fill_between(line, -0.5, -(line**2) / 20, color="0.8", lw=0)
 ax.plot([-2.2, 2.2], [2.03, 2.03], "k", lw=4)
 ax.annotate("", (0, 2.1), (0, 2.6), arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2})
-ax.text(0.1, 2.35, ".1 mm", color="C3")
-ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", ylim=(-0.5, 2.7))
-
-print(f"{basis.N} unknowns, {len(held)} held, {len(x)} nodes on the contact surface")
-
-assert np.abs(K - K.T).max() < 1e-12
+ax.text(0.1, 2.35, "0.1 mm", color="C3")
+for head, name in (((2.7, 0.6), "$n$"), ((3.3, 0.0), "$t$")):
+    ax.annotate("", head, (2.7, 0.0), arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 1.8})
+    ax.text(head[0] + 0.06, head[1] + 0.04, name)
+ax.annotate("", (0, -0.02), (0, -0.46), arrowprops={"arrowstyle": "-|>", "color": "C1", "lw": 2})
+ax.text(0.08, -0.42, "$r_n$", color="C1")
+_ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2.5, 3.6), ylim=(-0.5, 2.7))
 
 # %% [markdown]
 # ## Primal: all displacements
 #
-# The block takes the shape $U$ of least elastic energy that does not pass through the floor:
+# Let $U$ be the displacements of all nodes, $U_y$ their vertical parts, and $K$ the stiffness matrix. The block takes the
+# shape of least elastic energy that does not pass through the floor:
 #
 # $$ \min_U \; \tfrac12 U' K U \qquad \text{subject to} \qquad U_y + g \ge 0 \text{ on the bottom}, \quad U = U_{\text{top}} \text{ on the top.} $$
 #
-# Without friction this is the primal program of chapter 3, with more unknowns that have no constraint.
+# Without friction this is the primal program of chapter 3. It only has many more unknowns that have no constraint. The
+# multipliers of the constraint are the normal forces of the floor on the nodes.
 
 # %%
 U = cp.Variable(basis.N)
@@ -77,14 +89,19 @@ assert 3 < np.sum(pressed > 1e-4) < len(x)
 # %% [markdown]
 # ## Elimination
 #
-# Let $I$ be the unknowns that are free to move, and $T$ the matrix that picks the contact's unknowns out of them, normal first
-# in each node. Equilibrium is $K_{II} U_I = T' r - K_{I,\text{top}} U_{\text{top}}$. Solve it for the displacement of the
-# contact:
+# Let the index $I$ stand for the unknowns that are free to move. Let $T$ be the matrix that picks the unknowns of the contact
+# out of these, the normal one first at each node. The free unknowns are in equilibrium under the contact forces $r$ and the
+# motion of the plate:
 #
-# $$ u = Q\, r + q, \qquad Q = T K_{II}^{-1} T', \qquad q = T U^0 + g\, n, $$
+# $$ K_{II}\, U_I = T' r - K_{I,\text{top}}\, U_{\text{top}} . $$
 #
-# where $U^0$ is the displacement without contact forces. $Q$ is the inverse of the Schur complement of the stiffness. It says
-# how the surface moves under forces on the surface. Nothing has been approximated.
+# We solve this for $U_I$. The displacements of the contact are $T U_I$, and the gaps are these plus $g$ in the direction $n$:
+#
+# $$ u = Q\, r + q, \qquad Q = T K_{II}^{-1} T', \qquad q = T U_I^0 + g\, n, $$
+#
+# where $U_I^0$ is the solution without contact forces. $Q$ is the compliance of the surface: it says how the surface moves
+# under forces on the surface. It is also the inverse of the *Schur complement*, which is the stiffness that remains when the
+# inner unknowns are eliminated. Nothing has been approximated.
 
 # %%
 free = np.setdiff1d(np.arange(basis.N), held)
@@ -107,6 +124,20 @@ assert np.allclose(S, schur)
 
 # %% [markdown]
 # ## Dual: forces on the contact alone
+#
+# Without friction the unknowns of the dual problem are the normal forces alone. $Q_{nn}$ and $q_n$ are the normal parts of $Q$
+# and $q$:
+#
+# $$ \min_{r_n \ge 0} \; \tfrac12 r_n' Q_{nn} r_n + q_n' r_n . $$
+#
+# ## The optimality conditions
+#
+# Primal and dual have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They are equilibrium
+# of the block, and Signorini's conditions at every node $i$ of the contact:
+#
+# $$ u_n = Q_{nn} r_n + q_n, \qquad u_{n,i} \ge 0, \qquad r_{n,i} \ge 0, \qquad u_{n,i}\, r_{n,i} = 0 . $$
+#
+# The program in `cvxpy` is as short as in chapter 1, and its forces are the multipliers of the primal program:
 
 # %%
 r_n = cp.Variable(len(x))
@@ -121,15 +152,36 @@ assert np.allclose(r_n.value, pressed, atol=1e-4)
 assert answer.solved and np.allclose(answer.reactions[:, 0], pressed, atol=1e-4)
 
 # %% [markdown]
+# Without contact forces the displacements of the block are proportional to the motion of the plate. So if the plate comes down
+# further, only $q$ changes, and $Q$ stays the same. The slider shows how the contact grows.
+
+
+# %% tags=["hide-input"]
+def further_down(depth):
+    without_contact = depth / lowered * (T @ U_0).reshape(-1, 2) + np.column_stack([gap, 0 * gap])
+    forces = solve(InterfaceProblem(Q, without_contact, 0.0)).reactions[:, 0]
+    order = np.argsort(x)
+    fig, ax = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
+    ax.plot(x[order], forces[order] / (4 / 32), "C0.-")
+    ax.set(xlabel="x [mm]", ylabel="pressure [MPa]", ylim=(-0.05, 0.8))
+    ax.set_title(f"the floor carries {forces.sum():.2f} N")
+    return fig
+
+
+Slider("the plate comes down by [mm]", np.linspace(0.02, 0.2, 10), further_down, start=4)
+
+# %% [markdown]
 # ## Nitsche's method with finite elements
 #
-# Nitsche's method needs no multiplier: it takes the pressure $p(U) = -\sigma_{yy}$ from the elements themselves. With the gap
-# $u_n = U_y + g$ and $\gamma = \gamma_0 E / h$ the equation of virtual work is
+# Nitsche's method has no multiplier. It takes the pressure from the stresses in the elements, $p(U) = -\sigma_{yy}$. The gap is
+# $u_n = U_y + g$. The parameter is $\gamma = \gamma_0 E / h$ with the size $h$ of the elements and a number $\gamma_0$. In
+# chapter 1 we minimised a function. Here this function holds integrals over the bottom of the block, and its derivative must
+# vanish for every virtual displacement $v$:
 #
 # $$ a(U, v) - \int \tfrac1\gamma\, p(U)\, p(v) + \int \tfrac1\gamma\, [\,p(U) - \gamma u_n\,]_+ \,\bigl(p(v) - \gamma v_y\bigr) = 0 . $$
 #
-# It is chapter 1's function with the integrals over the bottom. The only nonlinear part is the bracket, so Newton's method
-# asks in every step where the bracket is positive.
+# The first term, $a(U, v)$, is the virtual work of the stresses. The only nonlinear part is the bracket
+# $[x]_+ = \max(x, 0)$. So in every step Newton's method asks where the bracket is positive, and solves a linear system.
 
 # %%
 lam, shear = lame_parameters(E, nu)
@@ -181,13 +233,14 @@ ax.legend(frameon=False)
 assert step < 30 and np.isclose(carried, pressed.sum(), rtol=0.02)
 
 # %% [markdown]
-# Both methods find the same pressure up to the error of the mesh. Take $\gamma_0$ too small, and the energy loses its minimum,
-# as in chapter 1 (exercise 4.4).
+# Both methods find the same pressure, up to the error of the mesh. If $\gamma_0$ is too small, the energy has no minimum, as in
+# chapter 1 (exercise 4.4).
 #
 # ## Friction with a given bound
 #
-# With Tresca's friction the primal energy gets the term $\sum g_i |u_{t,i}|$. The dual gets a box for every tangential force.
-# It is one convex program again, in 66 unknowns.
+# With Tresca friction the primal energy gets the term $\sum_i b_i |u_{t,i}|$, where $b_i$ is the friction bound of node $i$.
+# (Chapter 2 called it $g$. In this chapter $g$ is the gap.) In the dual problem every tangential force gets the constraint
+# $|r_{t,i}| \le b_i$. It is one convex program again, with 66 unknowns.
 
 # %%
 bound = np.full(len(x), 0.02)  # N
@@ -201,13 +254,17 @@ assert natural_map_residual(with_bound, r.value.reshape(-1, 2)) < 1e-4
 # %% [markdown]
 # ## What fails: a body that only contact holds
 #
-# Take the plate away and load the top by a pressure. Now nothing but the floor holds the block: its stiffness is singular, and
-# $K_{II}^{-1}$ does not exist. The block can move rigidly. The three rigid motions become unknowns $\lambda$ of the interface
-# problem, and the forces have to balance the load:
+# Take the plate away, and load the top by a pressure of 1 MPa. Now nothing but a flat floor holds the block. The block can move
+# as a rigid body, so its stiffness matrix is singular and $K_{II}^{-1}$ does not exist.
+#
+# The remedy is to treat the rigid motions as unknowns of the interface problem. In the plane there are three: two
+# translations and a rotation. The columns of a matrix $V$ hold what these motions do to the contact. The unknowns $\lambda$
+# say how far the block moves in each of them. In return, the contact forces have to balance the load, and $s$ is minus the
+# load in each motion:
 #
 # $$ u = Q\, r + V \lambda + q, \qquad V' r + s = 0 . $$
 #
-# contactopt finds the motions by itself.
+# contactopt finds the rigid motions by itself.
 
 # %%
 flat = MeshTri.init_tensor(np.linspace(-2, 2, 17), np.linspace(0, 2, 9)).with_boundaries(
@@ -228,13 +285,14 @@ assert np.isclose(resting.reactions[:, 0].sum(), 4.0)  # 1 MPa on 4 mm
 # ## Exercises
 #
 # **4.1** (Pen and paper.) The block of this chapter has $33 \times 17$ nodes, and the top row is held. How many free unknowns
-# has the primal problem, and how many has the dual one?
+# does the primal problem have? How many unknowns does the dual problem with friction have?
 
 # %% tags=["exercise"]
 answer = ...  # (primal, dual)
 
 # %% [markdown] tags=["solution"]
-# $2 \cdot 33 \cdot 16 = 1056$ displacements are free. The dual has two forces at each of the 33 nodes of the bottom, 66.
+# $2 \cdot 33 \cdot 16 = 1056$ displacements are free. The dual has two force components at each of the 33 nodes of the bottom,
+# which makes 66.
 
 # %% tags=["solution"]
 answer = (1056, 66)
@@ -243,15 +301,15 @@ answer = (1056, 66)
 check("4.1", answer, (1056, 66))
 
 # %% [markdown]
-# **4.2** (Pen and paper.) The load on the floating block, 4 mm wide, acts as one force at the distance $e$ from its middle. For
-# which $e$ does the block tip over?
+# **4.2** (Pen and paper.) The block without a plate is 4 mm wide. The load on it is one vertical force at the distance $e$ from
+# the middle. What is the largest $e$ for which the block does not tip over?
 
 # %% tags=["exercise"]
 answer = ...  # mm
 
 # %% [markdown] tags=["solution"]
 # The floor can only push. So the resultant of its forces lies between the ends of the block, and $e$ can be at most 2 mm.
-# Beyond that, no forces balance the load, and the interface problem is *infeasible*.
+# For a larger $e$ no forces balance the load, and the interface problem is *infeasible*.
 
 # %% tags=["solution"]
 answer = 2.0
@@ -260,8 +318,8 @@ answer = 2.0
 check("4.2", answer, 2.0)
 
 # %% [markdown]
-# **4.3** Solve the lowered block with Coulomb's law and $\mu = 0.4$, by Tresca's iteration from chapter 2 with the program
-# above. Give the forces, one row per node. The certificate grades them.
+# **4.3** Solve the block under the lowered plate with Coulomb's law and $\mu = 0.4$. Use Tresca's iteration of chapter 2, with
+# the program above. Give the forces, one row $(r_n, r_t)$ for each node. The certificate grades them.
 
 # %% tags=["exercise"]
 answer = ...  # (33, 2) forces [N]
@@ -280,8 +338,9 @@ answer = y.value.reshape(-1, 2)
 check("4.3", answer, InterfaceProblem(Q, q, 0.4))
 
 # %% [markdown]
-# **4.4** Nitsche's energy is convex only if $K$ minus the integral of $p\,p / \gamma$ is positive definite on the free unknowns.
-# Compute the smallest eigenvalue of this matrix for $\gamma_0 = 0.1$ and for $\gamma_0 = 10$. Is it positive?
+# **4.4** Nitsche's energy is convex only if one matrix is positive definite on the free unknowns: $K$ minus the matrix of the
+# integral of $p(U)\,p(v) / \gamma$. Compute the smallest eigenvalue of this matrix for $\gamma_0 = 0.1$ and for
+# $\gamma_0 = 10$. Is it positive?
 
 # %% tags=["exercise"]
 answer = ...  # (True or False for 0.1, True or False for 10)

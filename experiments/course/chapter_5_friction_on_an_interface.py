@@ -1,11 +1,11 @@
 # %% [markdown]
 # # Chapter 5. Coulomb friction on an interface
 #
-# We put together what we have: many nodes, bodies, and Coulomb's law. No energy has its minimum at the solution. All methods
-# therefore solve another, simpler problem again and again. We write three of them, compare their speed with their accuracy,
-# and look at problems that have no solution at all.
+# Now we put everything together: elastic bodies, many nodes, and Coulomb's law. The solution is not the minimum of an energy.
+# Therefore all methods solve another, simpler problem again and again. In this chapter we write three methods, compare their
+# speed and their accuracy, and look at a problem that has no solution at all.
 #
-# You need: chapters 2 and 4. Time: 50 minutes with the exercises.
+# You need chapters 2 and 4. The chapter takes 50 minutes with its exercises.
 
 # %%
 import time
@@ -20,9 +20,14 @@ from contactopt.teaching import Slider, check
 # %% [markdown]
 # ## The mechanical system
 #
-# A rubber block, 40 mm wide and 40 mm high, is pressed on a foundation of the same rubber with 100 N. Both spread under the
-# load, the foundation less than the block. Friction resists the difference. We use the right half; the tangent points
-# outwards.
+# A plate presses a rubber block, 40 mm wide and 40 mm high, on a foundation of the same rubber with 100 N. Under the load both
+# bodies spread sideways, the foundation less than the block. Friction resists the difference. The system is symmetric, so we
+# model its right half.
+#
+# The normal $n$ points out of the foundation, upwards. The tangent $t$ points to the right, which is outwards. $r$ is the
+# force on the block. The vectors $u$, $r$ and $q$ hold the components of all nodes, $(n, t)$ for the first node, then $(n, t)$
+# for the second, and so on. The plate may move down. So, as in chapter 4, there is a rigid motion $V$ with the unknown
+# $\lambda$, and the contact forces must balance the load: $V' r + s = 0$.
 
 # %%
 mu = 0.2
@@ -30,30 +35,48 @@ problem = reduce(scenes.flat_punch(2, mu=mu, elements=24))
 Q, q, V, s = problem.Q, problem.q.ravel(), problem.V, problem.s
 k = problem.contacts
 moves = np.diag(Q) > 0  # the node on the axis of symmetry cannot move sideways: its row of Q is zero
+print(f"{k} contacts, V {V.shape}: one plate, s = {s} N")
 
+# %% tags=["hide-input"]
 fig, ax = plt.subplots(figsize=(5, 3.4), layout="constrained")
 ax.fill([0, 20, 20, 0], [0, 0, 40, 40], color="C0", alpha=0.25, lw=0)
 ax.fill([0, 45, 45, 0], [0, 0, -25, -25], color="C1", alpha=0.25, lw=0)
 ax.plot([0, 0], [-25, 44], "k-.", lw=0.8)
-ax.annotate("", (10, 40), (10, 50), arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2})
+ax.plot([0, 20], [40.6, 40.6], "k", lw=4)
+ax.annotate("", (10, 42), (10, 54), arrowprops={"arrowstyle": "-|>", "color": "C3", "lw": 2})
+ax.text(11.5, 47, "100 N", color="C3")
 for head, name in (((40, 6), "$t$"), ((28, 18), "$n$")):
     ax.annotate("", head, (28, 6), arrowprops={"arrowstyle": "-|>", "color": "k"})
     ax.text(head[0] + 1, head[1] + 1, name)
 ax.plot(problem.coordinates[0], problem.coordinates[1], "k.", ms=3)
-ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48))
-
-print(f"{k} contacts, V {V.shape}: one plate, s = {s} N")
+ax.text(3, 20, "block")
+ax.text(3, -14, "foundation")
+_ = ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 48), ylim=(-26, 57))
 
 # %% [markdown]
 # ## Primal and dual for a given bound
 #
-# For given friction bounds $g$ there is a primal energy, in the displacements $u$ of the contact and the motion $\lambda$ of
-# the plate. With $S = Q^{-1}$ it is
+# First let the friction bound $g_i$ of every node be given. Then the solution is the minimum of an energy. The *primal*
+# problem has the displacements $u$ of the contact and the motion $\lambda$ of the plate as its unknowns. With the stiffness
+# $S = Q^{-1}$ it is
 #
-# $$ \min_{u_n \ge 0,\; \lambda} \; \tfrac12 (u - q - V\lambda)' S\, (u - q - V \lambda) - s' \lambda + \sum_i g_i |u_{t,i}| , $$
+# $$ \min_{u_n \ge 0,\; \lambda} \; \tfrac12 (u - q - V\lambda)' S\, (u - q - V \lambda) - s' \lambda + \sum_i g_i |u_{t,i}| . $$
 #
-# and its dual is $\min \tfrac12 r' Q r + q' r$ under $r_n \ge 0$, $|r_t| \le g$ and $V' r + s = 0$. The optimality conditions of
-# both are Signorini's conditions, friction with the bound $g$, and equilibrium of the plate.
+# The *dual* problem has the contact forces as its unknowns:
+#
+# $$ \min_r \; \tfrac12 r' Q r + q' r \qquad \text{subject to} \qquad r_n \ge 0, \quad |r_{t,i}| \le g_i, \quad V' r + s = 0 . $$
+#
+# ## The optimality conditions
+#
+# Both have the same optimality conditions, those of Karush, Kuhn and Tucker (KKT conditions). They are equilibrium of the
+# bodies and of the plate, and, at every node $i$, Signorini's conditions and friction with the bound $g_i$:
+#
+# $$ u = Q\, r + V \lambda + q, \qquad V' r + s = 0, \qquad u_{n,i} \ge 0, \quad r_{n,i} \ge 0, \quad u_{n,i}\, r_{n,i} = 0, $$
+#
+# $$ |r_{t,i}| \le g_i, \qquad u_{t,i} \ne 0 \;\Rightarrow\; r_{t,i} = -g_i\, \frac{u_{t,i}}{|u_{t,i}|} . $$
+#
+# The multiplier of the balance $V' r + s = 0$ is the motion $\lambda$ of the plate. Coulomb's law asks in addition that
+# $g_i = \mu r_{n,i}$. In `cvxpy` the bounds are a parameter, which we can change from one solve to the next:
 
 # %%
 n, t = slice(0, None, 2), slice(1, None, 2)
@@ -78,8 +101,9 @@ assert np.allclose(S @ (u.value - q - V @ plate.value)[moves], r.value[moves], a
 # %% [markdown]
 # ## Method 1: Tresca's iteration
 #
-# Solve for a bound, set $g = \mu r_n$, and repeat. Each step is one QP. The certificate falls by the same factor in every
-# step, until the accuracy of the QP solver ends it.
+# Solve the dual for a bound $g$, set $g = \mu r_n$, and repeat. Each step is one quadratic program (QP: a quadratic cost with
+# linear constraints). The certificate falls by the same factor in every step. It stops falling when it has reached the
+# accuracy of the QP solver.
 
 # %%
 g.value, road = np.zeros(k), []
@@ -94,9 +118,10 @@ assert road[-1] < 1e-4 and road[3] < road[1]
 # %% [markdown]
 # ## Method 2: Newton on the states
 #
-# If we knew which nodes are open, stick or slip, everything would be linear: $r = 0$ at open nodes, $u = 0$ at sticking ones,
-# and $u_n = 0$, $r_t = \mp \mu r_n$ at slipping ones. Newton's method guesses the states from the last answer: a node is
-# pressed if $r_n - \rho u_n > 0$, and it slips if $|r_t - \rho u_t|$ exceeds $\mu$ times that.
+# If we knew which nodes are open, which stick and which slip, all equations would be linear. An open node has $r = 0$. A
+# sticking node has $u = 0$. A slipping node has $u_n = 0$, and $r_t = -\mu r_n$ or $r_t = +\mu r_n$, against its slip. Newton's
+# method guesses the states from the last answer. A node is pressed if $y_n = r_n - \rho u_n$ is positive. A pressed node slips
+# if $|r_t - \rho u_t|$ exceeds $\mu\, y_n$. Then the method solves the linear equations that belong to these states.
 
 
 # %%
@@ -131,18 +156,23 @@ print(f"Newton: {steps} steps, certificate {natural_map_residual(problem, forces
 assert steps < 20 and np.allclose(forces, solve(problem, tol=1e-12).reactions.ravel(), atol=1e-8)
 
 # %% [markdown]
-# Once the states are right, the last step is exact. That is why Newton's method ends at the rounding error, and the fixed-point
-# iteration does not.
+# Once the states are right, the next step is exact. Therefore Newton's method ends with an error of the size of rounding.
+# Tresca's iteration does not.
 #
 # ## Method 3: a cone program with a shift
 #
-# Acary and Cadoux minimise over the cones themselves, $|r_t| \le \mu r_n$, with the term $\mu |u_t| r_n$ in the cost, and repeat
-# with the new slip. contactopt calls it `acary_cadoux`. The same program serves in 3D, where the cones are round.
+# As in chapter 2, Acary and Cadoux minimise over the cones $|r_{t,i}| \le \mu r_{n,i}$. The cost has the additional term
+# $\sum_i \mu\, \sigma_i r_{n,i}$, where $\sigma_i$ is the slip of node $i$ in the last answer. The program is solved again with
+# the new slips, until nothing changes. In contactopt the method has the name `acary_cadoux`. In three dimensions the program
+# is the same, with round cones.
 #
 # ## Penalty and multipliers
 #
-# Both can also replace the constraints. The penalty method makes an error of the size $1 / \kappa$. The *augmented Lagrangian*
-# adds the last contact force to the spring, and removes this error by repetition, with a moderate $\kappa$.
+# A penalty can replace the constraints of friction problems too. Its error has the size of $1 / \kappa$, where $\kappa$ is the
+# stiffness of the penalty springs. The *augmented Lagrangian* adds the contact force of the last iteration to the force of
+# the spring. By repetition it removes the error, although $\kappa$ is moderate.
+#
+# Now we compare five methods. Each is asked for a small certificate and for smaller and smaller ones.
 
 # %%
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
@@ -167,13 +197,15 @@ errors = [solve(problem, "penalty", factor=10.0**j).residual for j in (1, 2, 3)]
 assert errors[0] > 5 * errors[1] > 25 * errors[2]
 
 # %% [markdown]
-# A chart like this one is the only fair way to compare methods: *how long does it take until the same certificate is
-# reached?* The times are those of the machine that drew the figure.
+# A chart like this one compares methods fairly. It asks: *how long does each method take to reach the same certificate?* The
+# times are those of the machine that drew the figure.
 #
 # ## What more friction does
+#
+# The slider changes the friction coefficient. The dashed curve is the friction bound $\mu p$, where $p$ is the pressure.
 
 
-# %%
+# %% tags=["hide-input"]
 def with_friction(coefficient):
     answer = solve(InterfaceProblem(Q, problem.q, coefficient, V, s))
     pressure, shear = (answer.reactions / problem.areas[:, None]).T
@@ -188,15 +220,23 @@ def with_friction(coefficient):
 Slider("friction coefficient [-]", np.linspace(0, 0.6, 9), with_friction, start=3)
 
 # %% [markdown]
-# Where the two curves meet, the nodes slip. With more friction the slip zone shrinks towards the edge, and in the end all
-# nodes stick.
+# Where the two curves meet, the nodes slip. With more friction the slip zone shrinks towards the edge. In the end all nodes
+# stick.
 #
 # ## What fails: no solution
 #
-# A rigid sledge stands on two runners and is pressed down with 100 N. Somebody pulls it sideways with 25 N. Rigid bodies have
-# no compliance, $Q = 0$. The forces of the two runners have to balance the load, within the friction cones. With $\mu = 0.2$
-# they cannot: the sledge slides away, and there is no static solution. contactopt finds a proof of that, and says
-# `infeasible`.
+# A rigid sledge stands on two runners and is pressed down with 100 N. Somebody pulls it sideways with 25 N. A rigid body has
+# no compliance, so $Q = 0$. The forces on the two runners have to balance the load, and each of them has to lie in its
+# friction cone. With $\mu = 0.2$ this is impossible: the sledge slides away, and there is no static solution. contactopt finds
+# a proof of this, and says `infeasible`.
+#
+# | method | it fails if |
+# |---|---|
+# | Tresca's iteration | friction is strong: an error grows from step to step (chapter 2) |
+# | Newton on the states | the states repeat in a cycle, which happens for strong friction or a singular $Q$ |
+# | cones with a shift | friction is strong; there is no proof of convergence |
+# | penalty | an exact answer is asked for: its error is proportional to $1 / \kappa$ |
+# | any method | the load cannot be balanced: there is no solution |
 
 # %%
 motions = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 1.0]])  # both runners move up, or sideways
@@ -211,13 +251,13 @@ assert solve(InterfaceProblem(np.zeros((4, 4)), np.zeros((2, 2)), 0.3, motions, 
 # %% [markdown]
 # ## Exercises
 #
-# **5.1** (Pen and paper.) From which friction coefficient on can the sledge stand still?
+# **5.1** (Pen and paper.) What is the smallest friction coefficient with which the sledge stands still?
 
 # %% tags=["exercise"]
 answer = ...
 
 # %% [markdown] tags=["solution"]
-# The two runners carry 100 N together, so friction can hold $100 \mu$. It has to hold 25 N: $\mu = 0.25$.
+# Together the two runners carry 100 N, so friction can hold $100 \mu$ N. It has to hold 25 N. Hence $\mu = 0.25$.
 
 # %% tags=["solution"]
 answer = 0.25
@@ -226,9 +266,9 @@ answer = 0.25
 check("5.1", answer, 0.25)
 
 # %% [markdown]
-# **5.2** The load of the sledge is moved forward, so that the front runner carries 80 N and the back one 20 N. The front runner
-# stands on ice, with $\mu = 0.05$, and the back one on stone, with $\mu = 0.5$. Write a linear program for the largest pull
-# that the sledge withstands.
+# **5.2** The load of the sledge is moved forward, so that the front runner carries 80 N and the back runner 20 N. The front
+# runner stands on ice, with $\mu = 0.05$. The back runner stands on stone, with $\mu = 0.5$. Write a linear program for the
+# largest pull that the sledge withstands.
 
 # %% tags=["exercise"]
 answer = ...  # N
@@ -246,7 +286,7 @@ answer = float(pull.value)
 check("5.2", answer, 14.0)
 
 # %% [markdown]
-# **5.3** How many nodes of the block slip with $\mu = 0.2$? Count them in the answer of Newton's method.
+# **5.3** How many nodes of the block slip if $\mu = 0.2$? Count them in the answer of Newton's method, `forces`.
 
 # %% tags=["exercise"]
 answer = ...
@@ -258,8 +298,9 @@ answer = int(np.sum((np.abs(forces[t]) > mu * forces[n] * (1 - 1e-9)) & (forces[
 check("5.3", answer, diagnose(problem, solve(problem)).local.slip)
 
 # %% [markdown]
-# **5.4** Measure the factor by which the certificate of Tresca's iteration falls from one step to the next. (Take a tolerance of
-# $10^{-13}$ with `solve(problem, "tresca", tol=1e-13)` and look at `history`.) `diagnose` predicts it.
+# **5.4** Measure the factor by which the certificate of Tresca's iteration falls from one step to the next. (Run
+# `solve(problem, "tresca", tol=1e-13)`. Its `history` has an entry for every step, with the certificate as `"residual"`.)
+# The cell below compares your factor with the one that `diagnose` predicts.
 
 # %% tags=["exercise"]
 answer = ...

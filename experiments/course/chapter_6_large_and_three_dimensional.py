@@ -2,10 +2,10 @@
 # # Chapter 6. Large problems in three dimensions
 #
 # In three dimensions the friction force has two components, and its bound is a circle. The number of unknowns grows with the
-# third power of the resolution. What was a matter of taste before, namely which method, in which form, now decides whether
-# an answer comes at all. The guiding rule is: *model no more than a scene needs*.
+# third power of the resolution. On small problems it is a matter of taste which method we take, and in which form. On large
+# ones the choice decides whether we get an answer at all. One rule guides us: *model no more than a scene needs*.
 #
-# You need: chapters 3 and 5. Time: 50 minutes with the exercises.
+# You need chapters 3 and 5. The chapter takes 50 minutes with its exercises.
 
 # %%
 import cvxpy as cp
@@ -17,18 +17,95 @@ from contactopt.analytic import contact_modulus, hertz_point
 from contactopt.teaching import Slider, check
 
 # %% [markdown]
-# ## Round cones
+# ## The mechanical system
 #
-# The tangential force has the components $r_t = (r_1, r_2)$, and Coulomb's law bounds its length,
-# $\sqrt{r_1^2 + r_2^2} \le \mu r_n$. The cone is round, so the dual with a given bound is a *second-order cone program*:
+# A rigid plate presses a square rubber block on a foundation with 100 N. The system has two planes of symmetry, so a quarter
+# of it is enough. It has a fourth of the unknowns, and the same answer.
 #
-# $$ \min \; \tfrac12 r' Q r + q' r \qquad \text{subject to} \qquad r_n \ge 0, \quad |r_t| \le g . $$
+# The normal $n$ points out of the foundation, upwards. The two tangents $t_1$ and $t_2$ lie in the surface, along $x$ and
+# $y$. Every contact has three components in the order $(n, t_1, t_2)$: the force on the block is
+# $r = (r_n, r_1, r_2)$, and $u = (u_n, u_1, u_2)$ is the gap that remains with the two components of the slip. We write
+# $r_t = (r_1, r_2)$ and $u_t = (u_1, u_2)$ for the tangential parts.
+
+# %% tags=["hide-input"]
+fig = plt.figure(figsize=(5.4, 4.2), layout="constrained")
+ax = fig.add_subplot(projection="3d", computed_zorder=False)
+ax.bar3d(-40, -40, -30, 80, 80, 30, color="C1", alpha=0.12, shade=False, zorder=0)  # the foundation, cut off
+ax.bar3d(-20, -20, 0, 40, 40, 40, color="C0", alpha=0.10, shade=False, zorder=1)
+ax.bar3d(0, 0, 0, 20, 20, 40, color="C0", alpha=0.45, shade=False, zorder=2)  # the quarter that is modelled
+ax.quiver(10, 10, 68, 0, 0, -25, color="C3", lw=2, arrow_length_ratio=0.3, zorder=3)
+ax.text(13, 10, 58, "100 N", color="C3", zorder=3)
+for way, name in (((0, 0, 30), "$n$"), ((30, 0, 0), "$t_1$"), ((0, 30, 0), "$t_2$")):
+    ax.quiver(48, -48, 0, *way, color="k", lw=1.8, arrow_length_ratio=0.25, zorder=3)
+    ax.text(48 + 1.2 * way[0], -48 + 1.2 * way[1], 1.2 * way[2], name, zorder=3)
+ax.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", box_aspect=(1, 1, 0.8))
+ax.view_init(elev=22, azim=-58)
+
+# %% [markdown]
+# ## Primal and dual with a given friction bound
 #
-# Many codes replace the circle by a polygon with $m$ edges, which makes a QP of it. The polygon inside the circle is a weaker
-# law: along the middle of an edge it carries less friction. And it prefers some directions, which the material does not.
+# As before, let the friction bound $g_i$ of every contact be given first. Only one thing is new: $|r_{t,i}|$ and $|u_{t,i}|$
+# are now the lengths of vectors with two components. $S = Q^{-1}$ is the stiffness at the contact. $V$ is the motion of the
+# plate, $\lambda$ its size, and $s$ is minus the load on it.
+#
+# Primal, in displacements:
+#
+# $$ \min_{u_n \ge 0,\; \lambda} \; \tfrac12 (u - q - V\lambda)' S\, (u - q - V \lambda) - s' \lambda + \sum_i g_i |u_{t,i}| . $$
+#
+# Dual, in forces:
+#
+# $$ \min_r \; \tfrac12 r' Q r + q' r \qquad \text{subject to} \qquad r_n \ge 0, \quad |r_{t,i}| \le g_i, \quad V' r + s = 0 . $$
+#
+# ## The optimality conditions
+#
+# The optimality conditions of Karush, Kuhn and Tucker (KKT conditions) are those of chapter 5, but the tangential parts are
+# vectors in the surface. Friction points against the slip:
+#
+# $$ u = Q\, r + V \lambda + q, \qquad V' r + s = 0, \qquad u_{n,i} \ge 0, \quad r_{n,i} \ge 0, \quad u_{n,i}\, r_{n,i} = 0, $$
+#
+# $$ |r_{t,i}| \le g_i, \qquad u_{t,i} \ne 0 \;\Rightarrow\; r_{t,i} = -g_i\, \frac{u_{t,i}}{|u_{t,i}|} . $$
+#
+# Coulomb's law asks in addition that $g_i = \mu r_{n,i}$. Then each force lies in a round cone,
+# $\sqrt{r_1^2 + r_2^2} \le \mu r_n$.
+#
+# ## Both programs for one node
+#
+# One node without a plate shows the programs on one screen. It is pressed on the floor and pulled along the first tangent, hard
+# enough to slip. The friction bound is 0.5 N. A constraint on the length of a vector makes the dual a *second-order cone
+# program* (SOCP).
 
 
 # %%
+def pulled(degrees):
+    """One node on its own: pressed down by 1 mm and pulled 3 mm in a direction, that angle from the first tangent."""
+    angle = np.deg2rad(degrees)
+    return InterfaceProblem(np.eye(3), [[-1.0, 3 * np.cos(angle), 3 * np.sin(angle)]], 0.5)
+
+
+one, bound = pulled(0.0), 0.5
+Q, q = one.Q, one.q[0]
+
+u = cp.Variable(3)
+primal_energy = cp.quad_form(u - q, np.linalg.inv(Q)) / 2 + bound * cp.norm(u[1:])
+cp.Problem(cp.Minimize(primal_energy), [u[0] >= 0]).solve(solver=cp.CLARABEL)
+
+r = cp.Variable(3)
+disc = cp.norm(r[1:]) <= bound
+cp.Problem(cp.Minimize(cp.quad_form(r, Q) / 2 + q @ r), [r[0] >= 0, disc]).solve(solver=cp.CLARABEL)
+print(f"u = {np.round(u.value, 4)} mm, r = {np.round(r.value, 4)} N")
+
+assert np.allclose(r.value, [1.0, -0.5, 0.0], atol=1e-4)
+assert np.allclose(u.value, Q @ r.value + q, atol=1e-3)
+
+# %% [markdown]
+# ## Polygons in place of circles
+#
+# Many codes replace the circle by a polygon with $m$ edges, also called facets. All constraints are then linear, and the
+# program is a quadratic program (QP). But a polygon inside the circle is a weaker law. In the direction of the middle of an
+# edge it carries less friction. It also prefers the directions of its corners, which the material does not.
+
+
+# %% tags=["hide-input"]
 def polygon(facets):
     angle = np.linspace(0, 2 * np.pi, 721)
     half = np.pi / facets
@@ -45,17 +122,9 @@ def polygon(facets):
 Slider("facets [-]", [3, 4, 6, 8, 12, 16, 32], polygon, start=3)
 
 # %% [markdown]
-# One node shows it. It is pressed on the floor and pulled along the first tangent, hard enough to slip. The friction bound is
-# .5 N.
-
+# The node from above shows the difference. `contactopt.models` has both programs ready, with the circle and with a polygon.
 
 # %%
-def pulled(degrees):
-    angle = np.deg2rad(degrees)
-    return InterfaceProblem(np.eye(3), [[-1.0, 3 * np.cos(angle), 3 * np.sin(angle)]], 0.5)
-
-
-one = pulled(0.0)
 program = {name: models.tresca(one, facets=facets) for name, facets in (("circle", None), ("8 facets", 8))}
 for name, each in program.items():
     each.parameters["g"].value = np.array([0.5])
@@ -68,10 +137,10 @@ assert np.isclose(round_force, 0.5, atol=1e-4)
 assert np.linalg.norm(program["8 facets"].variables["r"].value[1:]) < 0.47
 
 # %% [markdown]
-# ## The mechanical system
+# ## The block
 #
-# A square rubber block stands on a foundation and is pressed on it. The scene has two planes of symmetry, so a quarter is
-# enough: the fourth part of the unknowns, and the same answer.
+# Now we solve the block of the drawing, with Coulomb's law and $\mu = 0.3$. The colours of the figure show the pressure on the
+# quarter. The arrows show the friction force on the block, and crosses mark the nodes that slip.
 
 # %%
 scene = scenes.flat_punch(3, mu=0.3, elements=8)
@@ -86,7 +155,7 @@ dots = ax.scatter(x, y, c=pressure / problem.areas, s=110, marker="s", alpha=0.6
 ax.quiver(x, y, *answer.reactions[:, 1:].T, color="black", width=0.005, zorder=3)
 ax.plot(x[slips], y[slips], "rx", ms=5, label="slips", zorder=4)
 ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-ax.legend(loc="upper right")
+ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
 fig.colorbar(dots, label="pressure [MPa]")
 print(f"{problem.contacts} contacts, {int(slips.sum())} slip, certificate {answer.residual:.0e}")
 
@@ -95,22 +164,28 @@ assert answer.solved and 0 < slips.sum() < len(slips)
 # %% [markdown]
 # ## Primal or dual?
 #
-# In three dimensions with $N$ nodes along each edge the block has about $3 N^3$ displacements, and $3 N^2$ contact forces.
+# Let the block have $N$ nodes along each edge. Then it has about $3 N^3$ displacements and $3 N^2$ contact forces.
 #
 # | | unknowns | matrix | memory for $N = 100$ |
 # |---|---|---|---|
-# | primal | $3 N^3$ | sparse, 81 entries per row | 3 GB and its factors |
-# | dual, $Q$ as an array | $3 N^2$ | dense | 7 GB |
-# | dual, $Q$ by its products | $3 N^2$ | not formed | that of the primal |
+# | primal | $3 N^3$ | sparse, 81 entries per row | 3 GB, and more for its factors |
+# | dual, $Q$ as an array | $3 N^2$ | dense | 7 GB (exercise 6.1) |
+# | dual, $Q$ known by its products | $3 N^2$ | never formed | as much as the primal |
 #
-# The dual with products, $Q r = \sum_b T_b K_b^{-1} T_b' r$, needs one solve of each body for every product. So the number of
-# products is what counts, and a preconditioner pays. (The numbers of the table are those of exercise 6.1.)
+# The third way never forms $Q$. It computes products $Q r = \sum_b T_b K_b^{-1} T_b' r$. The sum is over the bodies $b$, with the
+# stiffness $K_b$ and the matrix $T_b$ that picks the contact, as in chapter 4. Each product takes one linear solve with each
+# body. So the number of products decides the cost.
 #
 # ## A preconditioner for the surface
 #
-# On the surface of a body, $Q$ divides a wave by its wave number. The condition number of $Q$ therefore grows like $N$, and
-# the number of products of a Newton step like $\sqrt N$. Multiplying by the wave number undoes it: this is the square root of
-# the surface's Laplacian, the $H^{1/2}$ seminorm of the paper. We count products with and without it.
+# With products alone, a linear system is solved by an iteration such as conjugate gradients. Its number of steps grows like the
+# square root of the condition number of the matrix. On the surface of a body, $Q$ divides a wave of pressure by its wave
+# number. Therefore the condition number of $Q$ grows like $N$, and the number of products in a step of Newton's method grows
+# like $\sqrt N$.
+#
+# A *preconditioner* is a cheap approximation of $Q^{-1}$ that makes the iteration short. Here it multiplies a wave by its wave
+# number. This operation is the square root of the Laplacian of the surface. (The paper by A. Lotfi works with it as the
+# $H^{1/2}$ seminorm.) We count products with and without it.
 
 # %%
 products = {}
@@ -133,8 +208,10 @@ assert products[12][1] < 1.6 * products[4][1]
 # %% [markdown]
 # ## Without a mesh
 #
-# A body that is large beside its contact is a half-space. Then $Q$ is a convolution with a known kernel, and a product costs
-# two Fourier transforms. Nothing is meshed. The same program, the same certificate, and 4,096 contacts in a moment:
+# A body that is large beside its contact may be modelled as a half-space, elastic everywhere below a plane. Then nothing is
+# meshed. $Q$ is a convolution with a function that is known exactly, so that a product takes a few fast Fourier transforms.
+# The dual program and the certificate stay the same. Here a rigid sphere is pressed on a half-space, with 4,096 contacts, and
+# compared with Hertz's exact solution:
 
 # %%
 rubber, R, P = Material(E=5.0, nu=0.3), 400.0, 100.0
@@ -160,12 +237,13 @@ assert round_answer.solved and abs(p.max() / hertz.peak - 1) < 5e-3
 # %% [markdown]
 # ## What fails
 #
-# - **A dense matrix.** $Q$ as an array needs $8\,(3k)^2$ bytes for $k$ contacts. contactopt says its size, and refuses one that is
-#   too large.
-# - **The preconditioner in place of the matrix.** $P$ is near $Q^{-1}$, but it is not $Q^{-1}$. Inside an iteration it changes the
-#   cost and not the answer. Put in place of $Q$ it gives the answer to another problem.
-# - **Loose inner solves.** A product that is accurate to $10^{-4}$ limits the certificate to about $10^{-4}$. The accuracy of
-#   the products has to follow that of the outer iteration.
+# - **The matrix is too large.** $Q$ as an array needs $8\,(3k)^2$ bytes for $k$ contacts. contactopt refuses an array that is too
+#   large, and says its size.
+# - **The preconditioner takes the place of the matrix.** A preconditioner $P$ is near $Q^{-1}$, but it is not $Q^{-1}$. Inside an
+#   iteration it changes the cost and not the answer. If $P^{-1}$ is put in place of $Q$, the answer is that of another problem.
+#   The cell below shows how wrong it can be.
+# - **The products are not accurate enough.** If the products are accurate to $10^{-4}$ only, the certificate cannot fall below
+#   about $10^{-4}$. The products must become more accurate while the outer iteration converges.
 
 # %%
 Q = problem.Q
@@ -186,7 +264,7 @@ assert difference > 0.1
 answer = ...  # GB
 
 # %% [markdown] tags=["solution"]
-# $3 \cdot 10^4$ unknowns, $9 \cdot 10^8$ entries, $7.2 \cdot 10^9$ bytes.
+# There are $3 \cdot 10^4$ unknowns, so $Q$ has $9 \cdot 10^8$ entries. They take $7.2 \cdot 10^9$ bytes.
 
 # %% tags=["solution"]
 answer = 8 * (3 * 100**2) ** 2 / 1e9
@@ -195,15 +273,15 @@ answer = 8 * (3 * 100**2) ** 2 / 1e9
 check("6.1", answer, 7.2)
 
 # %% [markdown]
-# **6.2** (Pen and paper.) Friction is replaced by a polygon inside the circle. How many facets are needed so that at most 1 % of
-# the friction is lost in any direction?
+# **6.2** (Pen and paper.) The circle of the friction bound is replaced by a polygon inside it. How many facets are needed so that
+# at most 1 % of the friction is lost in any direction?
 
 # %% tags=["exercise"]
 answer = ...  # an integer
 
 # %% [markdown] tags=["solution"]
-# In the middle of an edge the polygon reaches $\cos(\pi / m)$ of the radius. $\cos(\pi / m) \ge 0.99$ needs
-# $m \ge \pi / \arccos 0.99 = 22.2$, so 23 facets.
+# In the middle of an edge the polygon reaches the part $\cos(\pi / m)$ of the radius. The condition $\cos(\pi / m) \ge 0.99$
+# means $m \ge \pi / \arccos 0.99 = 22.2$. So 23 facets are needed.
 
 # %% tags=["solution"]
 answer = int(np.ceil(np.pi / np.arccos(0.99)))
@@ -212,14 +290,14 @@ answer = int(np.ceil(np.pi / np.arccos(0.99)))
 check("6.2", answer, lambda m: m == 23)
 
 # %% [markdown]
-# **6.3** How does the peak pressure under a sphere grow when the load is doubled? Find the factor with the half-space, with
-# the load of 200 N (make the grid wide enough), and compare it with Hertz's exponent.
+# **6.3** By which factor does the peak pressure under the sphere grow when the load is doubled? Solve the half-space with a load
+# of 200 N to find the factor. (Make the grid wide enough.) Hertz's exact solution grades your answer.
 
 # %% tags=["exercise"]
 answer = ...  # peak at 200 N / peak at 100 N
 
 # %% [markdown] tags=["solution"]
-# Hertz: $p_0 \sim P^{1/3}$, so the factor is $2^{1/3} = 1.26$.
+# In Hertz's solution the peak pressure is proportional to $P^{1/3}$, so the factor is $2^{1/3} = 1.26$.
 
 # %% tags=["solution"]
 wide = grid * 2 ** (1 / 3)
@@ -233,15 +311,16 @@ answer = (solve(heavier).reactions[:, 0] / heavier.areas).max() / p.max()
 check("6.3", answer, lambda factor: abs(factor - 2 ** (1 / 3)) < 0.01)
 
 # %% [markdown]
-# **6.4** Take the node of the beginning, `pulled(22.5)`, with *four* facets instead of the circle. Friction should pull back at
-# 22.5 degrees. At which angle does it really pull back? (An angle between 0 and 90 degrees from the first tangent.)
+# **6.4** Pull the node of the beginning in another direction, `pulled(22.5)`, and take *four* facets instead of the circle. In
+# the material, friction pulls back along the same line, at 22.5 degrees from the first tangent. At which angle does it pull
+# back with four facets? (Give an angle between 0 and 90 degrees.)
 
 # %% tags=["exercise"]
 answer = ...  # degrees
 
 # %% [markdown] tags=["solution"]
-# Friction goes against the slip as far as the square allows, and that is into a corner of it. So it pulls back at 45 degrees,
-# 22.5 degrees off the motion.
+# Friction goes as far against the slip as the square allows. That is into a corner of the square. So it pulls back at 45
+# degrees, which is 22.5 degrees off the motion.
 
 # %% tags=["solution"]
 square = models.tresca(pulled(22.5), facets=4)
@@ -260,7 +339,7 @@ check("6.4", answer, lambda angle: abs(angle - 45) < 1)
 # - K. L. Johnson, *Contact Mechanics*, Cambridge University Press 1985,
 #   [doi:10.1017/CBO9781139171731](https://doi.org/10.1017/CBO9781139171731).
 #
-# This is the end of the course. The tutorials go on from here, each with one subject.
+# This is the end of the course. The tutorials go on from here. Each of them has one subject.
 
 # %% tags=["remove-cell"]
 plt.show()  # opens the figures where this runs as a script

@@ -127,14 +127,16 @@ def growth(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return made
 
 
-TEXT = """Chains of blocks and walls of bricks of 16 x 16 linear elements that only rest on each other and on a rigid floor, with friction.
-Under their own weight the lowest joints bear everything above them, and in low ones nothing slips. `pressed`: no weight, one
-plate on every body of the highest row, rows of stiff and soft bodies by turns, so that every joint slips at its edges.
+TEXT = """How does the time grow with the number of bodies? The scenes are chains of blocks and walls of bricks. Each body has 16 x 16 linear
+elements. The bodies rest on each other and on a rigid floor, held by contact and friction alone. Under their own weight the lowest
+joints bear everything above them. In low chains and walls nothing slips. In the rows `pressed` there is no weight. Instead a plate presses
+every body of the highest row. Rows of stiff and soft bodies take turns, so that every joint slips at its edges.
 
 {runs}
 
-Seconds are those of the processor, one thread, of one run. Slopes are fits of log seconds over log bodies, from 4
-bodies on. A wall has 5 joints for 4 bodies, and 47 for 32: the slope over the number of joints leaves this out.
+The seconds are processor seconds of one run with one thread. The slopes are those of the logarithm of the seconds over the logarithm
+of the number of bodies, from 4 bodies on. A wall has 5 joints for 4 bodies, and 47 joints for 32 bodies. The slope over the number of
+joints takes this into account.
 
 {growth}
 """

@@ -192,22 +192,23 @@ def draw(rows: list[dict[str, Any]]) -> Figure:
     return figure
 
 
-TEXT = """The foundation of `punch-3d`: hexahedra graded away from the contact by 1.3, held on three sides. One load, random on the
-contact unknowns. Multigrid and pyamg's defaults ({versions}) go on to a relative accuracy of 1e-10: (r' B r)^1/2 with the
-V-cycle B, or |r|. Processor seconds of one thread; memory that the solver keeps, the matrix not counted; complexity:
-entries of all levels over those of the matrix; residual |b - A x| / |b|.
+TEXT = """Which solver of a body's linear system is the fastest? The body is the foundation of `punch-3d`. Its hexahedra grow by 1.3 away from the
+contact, and it is held on three sides. One load is random on the unknowns of the contact. Multigrid and the defaults of pyamg ({versions})
+iterate to a relative accuracy of 1e-10. It is measured by (r' B r)^1/2 with the V-cycle B for the one, and by |r| for the other. The table has
+processor seconds of one thread, and the memory that the solver keeps, without the matrix. "complexity" is the number of entries of all levels over
+those of the matrix. "residual" is |b - A x| / |b|.
 {large}
 {{rows}}
 
-Growth: exponents of the number of unknowns, fitted to the three largest sizes of each solver.
+**Growth.** The table has exponents of the number of unknowns, fitted to the three largest sizes of each solver.
 
 {{growth}}
 
-"pyamg's defaults" has the same blocks and rigid motions and takes every neighbour for a strong one; flat elements make its
-iterations grow with the mesh. `multigrid` aggregates only nodes close in the measure of the mesh around them.
+"pyamg's defaults" has the same blocks and rigid motions, and takes every neighbour for a strong one. Flat elements then make its
+iterations grow with the mesh. `multigrid` joins only nodes that are close to each other, measured by the size of the mesh around them.
 
-Both bodies by multigrid at the same time, one thread each. The products with sparse matrices leave Python's lock to the
-other thread; pyamg's aggregation and smoothing of the prolongation, in the setup, do not. Waiting for a core is not counted.
+**Both bodies at the same time**, by multigrid with one thread each. Products with sparse matrices leave Python's lock to the other thread. In
+the set-up, the aggregation of pyamg and the smoothing of the prolongation do not. Waiting for a core is not counted.
 
 {{threads}}
 """

@@ -155,10 +155,13 @@ def compared(program: str, name: str, scene: Scene, text: str, limit: float) -> 
     ]
 
 
-TEXT = """The punch with friction, mu = {mu}, from cold, each code once, on the very same nodes and elements: bilinear elements in the
-plane, trilinear ones on a quarter in space. contactopt at its defaults, meshes, assembly, reduction, solution and stresses included.
-CalculiX by its direct solver with node-to-surface penalty contact, factor {factor:.0e}; reading the deck is included. CPU seconds,
-since other programs had a share of the machine. A run that was ended at its limit gives a lower bound of the ratio.
+TEXT = """How long do CalculiX and contactopt take for the same large problem? The scene is the punch with friction, mu = {mu}, from a cold start. Both
+codes have the very same nodes and elements: bilinear elements in the plane, and trilinear ones on a quarter of the scene in three
+dimensions. Each code runs once.
+
+The time of contactopt, at its defaults, includes meshes, assembly, reduction, solution and stresses. CalculiX uses its direct solver
+and node-to-surface penalty contact with the factor {factor:.0e}. Its time includes the reading of the deck. Times are CPU seconds,
+because other programs had a share of the machine. If a run was ended at its time limit, the ratio is a lower bound.
 
 {{rows}}
 """

@@ -144,23 +144,26 @@ def figure(deviation: np.ndarray, found: contactopt.Fit) -> Any:
     return made
 
 
-TEXT = f"""Two equal cylinders (half-planes of E = {E:g} MPa, nu = 0.3, mu = {MU:g}, the radius of one is {RADIUS:g} mm, the other is flat) are pressed by
-{FORCE:g} N and pushed to and fro by {len(LOADS)} shear forces up to {max(LOADS):g} N. The shift of the upper one is measured, E of both bodies and mu are fitted from E = {START["E"]:g}, mu = {START["mu"]:g}.
+TEXT = f"""How well do measurements of a sheared contact determine friction and stiffness? Two cylinders are pressed by {FORCE:g} N and pushed to and
+fro by {len(LOADS)} shear forces up to {max(LOADS):g} N. They are half-planes with E = {E:g} MPa, nu = 0.3 and mu = {MU:g}. One has a radius of
+{RADIUS:g} mm, and the other is flat. The shift of the upper one is measured. From it `contactopt.fit` finds E of both bodies and mu. It
+starts from E = {START["E"]:g}, mu = {START["mu"]:g}.
 
-Without noise, data from the same grid of 40 points, and data from a finer grid, where what is left is the error of the coarse one:
+**Without noise.** The data come from the same grid of 40 points, or from a finer grid. In the second case the error that is left is that of the
+coarse grid:
 
 {{clean}}
 
-With normal noise of {NOISE:.0%} of the largest shift, {REPEATS} repetitions. The 95 % intervals should hold the truth about 95 times; a binomial
-count of 100 varies by 2.2. A count below 95 for mu is what a linear interval gives where the model has a kink at every point that begins to
-slip:
+**With noise.** Normal noise of {NOISE:.0%} of the largest shift is added, in {REPEATS} repetitions. The 95 % intervals should contain the
+truth about 95 times, and a binomial count of 100 varies by 2.2. For mu the count may be lower: the interval is computed from a linear
+model, but the true one has a kink at every point that begins to slip:
 
 {{repetitions}}
 
-Where mu cannot be known: the standard deviation of mu that five states up to the shear T leave, from the Jacobian at the truth. The
-slip zone shrinks with T, and with it what the shift tells of mu. Where no point of the grid slips, mu does not enter at all, and `fit`
-says so (mu = {MU:g}; the curves of the other values fall on one, because only T / (mu P) counts). The curve goes up and down where points of
-the grid begin to slip one by one:
+**Where mu cannot be known.** The table has the standard deviation of mu that remains after five states up to the shear T. It is computed from the
+derivatives at the truth. The slip zone shrinks with T, and with it the information about mu in the shift. If no point of the grid
+slips, mu has no influence at all, and `fit` says so. (Here mu = {MU:g}. The curves of other values fall on this one, because
+only T / (mu P) counts.) The curve goes up and down, because the points of the grid begin to slip one by one:
 
 {{knowledge}}
 

@@ -87,17 +87,21 @@ def draw(paths: dict[str, PathResult]) -> Figure:
     return figure
 
 
-TEXT = """Two bodies of one material, pressed by 100 N and sheared to +-T, mu = .5: the state at +T after a whole cycle,
-and the energy lost in the cycle, which starts at the first +T. Plane strain (nu = .3; cylinder of radius 4,000
-mm, bodies 50 half-widths large) and 3D (nu = 0; sphere of radius 10,000 mm, half model, bodies 8 contact radii large). Tractions are
-compared node by node (no smoothing), where the exact ones have vertical tangents at both edges. `loss` is the
-friction work, `loop's area` the integral of the shear force over the shift by the trapezoidal rule, eight chords each
-way, which is coarser. `energy balance` is the largest error of external work = elastic energy + friction
-work + error of the steps, relative to the energy.
+TEXT = """How accurate are sheared contacts? Two bodies of one material are pressed by 100 N and sheared to and fro by T, with mu = .5. Cattaneo and
+Mindlin's exact solution is compared with two things: the state at +T after a whole cycle, and the energy that the cycle costs. The cycle
+starts at the first +T.
+
+There are two scenes. In plane strain (nu = .3) a cylinder has a radius of 4,000 mm, and the bodies are 50 contact half-widths large. In 3D
+(nu = 0) a sphere has a radius of 10,000 mm, half of it is modelled, and the bodies are 8 contact radii large.
+
+Tractions are compared node by node, without smoothing, although the exact ones have vertical tangents at both edges. `loss` is the
+friction work. `loop's area` is the integral of the shear force over the shift by the trapezoidal rule. It has eight chords each way, and is
+therefore coarser. The balance of energy says: external work = elastic energy + friction work + error of the steps. `energy balance` is
+its largest error, relative to the energy.
 
 {loads}
 
-Resolution, at T = .6 mu P:
+The next table shows the influence of the mesh, at T = .6 mu P:
 
 {meshes}
 """

@@ -69,10 +69,13 @@ def row(name: str) -> dict[str, object]:
     }
 
 
-TEXT = """The named scenes at their own resolution; processor seconds, medians of {repeats} solves, one BLAS thread. "Checks of the problem" is the making
-of the `InterfaceProblem` from its arrays, "method alone" the same iterates without driver and certificate. Both shares count all that
-is not the method (checks, dimensionless form, equilibrium of the load, certificates, history): of the time that the interface problem
-takes, and of the solve of the scene from the meshes to the reactions.
+TEXT = """How much time do the certificate and the checks cost? The named scenes are solved at their own resolution. Times are processor seconds,
+medians of {repeats} solves with one BLAS thread. "Checks of the problem" is the making of the `InterfaceProblem` from its arrays. "Method
+alone" makes the same iterates without the driver and the certificate.
+
+Both shares count all that is not the method: checks, the dimensionless form, equilibrium of the load, certificates, and history. The
+first share is that of the time that the interface problem takes. The second is that of the solve of the scene, from the meshes to
+the contact forces.
 
 {rows}
 """

@@ -10,6 +10,8 @@ from matplotlib.figure import Figure
 
 from contactopt import scenes
 from contactopt.analysis.paths import PathResult, follow
+from contactopt.bodies.elements import elements_of
+from contactopt.figures.pieces import outline, pieces, triangles
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
 from contactopt.interface.recovery import recover
 from experiments.report import REPORTS
@@ -24,11 +26,11 @@ def draw_bodies(ax, path: PathResult, a: float) -> None:  # type: ignore[no-unty
     top = max(float(np.quantile(body.von_mises, 0.999)) for body in bodies)
     for body in bodies:
         x, y = body.mesh.p + MAGNIFIED * body.displacement
-        corners = body.mesh.t.T
-        cells = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]) if corners.shape[1] == 4 else corners
+        kind, elements = elements_of(body.mesh)
+        cells = triangles(pieces(kind, elements))
         colours = ax.tripcolor(x, y, cells, body.von_mises, shading="gouraud", cmap="cividis", vmin=0, vmax=top)
-        outline = body.mesh.facets[:, body.mesh.boundary_facets()]
-        ax.plot(x[outline], y[outline], color="black", lw=1)
+        rim = outline(kind, elements).T
+        ax.plot(x[rim], y[rim], color="black", lw=1)
     arrow = {"arrowstyle": "-|>", "lw": 2, "color": ORANGE, "mutation_scale": 18}
     middle = float(np.mean([MAGNIFIED * body.displacement[1, 0] for body in bodies]))
     ax.annotate("", (0, 1.3 * a + middle), (0, 2.3 * a + middle), arrowprops=arrow)

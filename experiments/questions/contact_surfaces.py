@@ -203,22 +203,23 @@ def draw(rows: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """Two stubs of tetrahedra on each other, one over each triangle of a surface that gmsh meshed, and a pin in a bush in the plane.
-Condition numbers of the whole operator, normal and tangential components together, and iterations of conjugate gradients
-from a random right-hand side to 1e-8; `deflated`: constant and linear motions solved for exactly. The only number that was
-fitted to stubs is ALONG (`contactopt/solving/preconditioners/constants.py`), on the disc.
+TEXT = """Does the preconditioner `laplacian` work on contact surfaces of any shape? Two stubs stand on each other along a
+surface. gmsh meshed this surface with triangles, and each stub has a column of tetrahedra over each triangle. In the plane a pin sits in a bush. The table has condition numbers of
+the whole operator, with normal and tangential components together. It also has the iterations of conjugate gradients from a random
+right-hand side to 1e-8. `deflated` means that constant and linear motions are solved for exactly. The only number that was fitted to
+stubs is ALONG (`contactopt/solving/preconditioners/constants.py`), and it was fitted on the disc.
 
-1. Deflated, the worst surface that was not fitted on is {worst}: condition {most:.1f}; the most iterations are {steps}.
-   On the disc they are {disc}. {beyond}
-2. By itself the preconditioner has condition numbers up to {plain:.1f}, and at most {plainsteps} iterations. Without any,
-   conjugate gradients take up to {none}.
-3. The ratio of the stiffnesses, from 1e-4 to 1e4, changes a condition number by at most {spread:.0f} %.
-4. With the number of contacts the deflated condition number changes from the coarsest to the finest mesh by a factor
-   of {least:.2f} to {largest:.2f}.
+1. With deflation, the worst surface that was not fitted on is {worst}, with the condition number {most:.1f}. No surface takes more than {steps} iterations. On the disc
+   the condition numbers are {disc}. {beyond}
+2. By itself the preconditioner has condition numbers up to {plain:.1f}, and needs at most {plainsteps} iterations. Without any
+   preconditioner, conjugate gradients take up to {none}.
+3. The ratio of the stiffnesses of the two bodies, from 1e-4 to 1e4, changes a condition number by at most {spread:.0f} %.
+4. From the coarsest to the finest mesh, the deflated condition number changes by a factor of {least:.2f} to {largest:.2f}.
 
 {{rows}}
 
-The ring with so many contacts that Q is known by its products only; the condition number is an estimate from below by Lanczos' method:
+The last table has the ring with so many contacts that Q is known by its products only. The condition number is an estimate from
+below by the method of Lanczos:
 
 {{many}}
 """
@@ -241,7 +242,7 @@ def report(rows: list[dict]) -> str:
         most=worst["deflated: condition"],
         steps=max(row["deflated: iterations"] for row in rows),
         disc=f"{min(disc):.1f} to {max(disc):.1f}",
-        beyond=f"Above 10 or 30 iterations: {len(above)} of {len(rows)} rows.",
+        beyond=f"{len(above)} of {len(rows)} rows have a condition number above 10 or more than 30 iterations.",
         plain=max(row["laplacian: condition"] for row in rows),
         plainsteps=max(row["laplacian: iterations"] for row in rows),
         none=max(row["none: iterations"] for row in rows),

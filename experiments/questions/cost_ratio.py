@@ -105,15 +105,16 @@ def measure(name: str, solver: str) -> dict[str, Any]:
     }
 
 
-TEXT = f"""From assembled bodies to certified reactions (residual at most 1e-8): both bodies factorised at the same time on two
-cores, Newton's method. Against it one direct solve of the same two bodies bonded at the contact nodes, the plate's motion
-given: the same solver and ordering, one forward and backward substitution. Medians of
-{REPEATS} runs in turn, `OMP_NUM_THREADS=1`. The second ratio counts the seconds of both threads.
+TEXT = f"""What does friction cost? The time from assembled bodies to certified contact forces (residual at most 1e-8) is compared with that of one linear
+solve. For the frictional problem two cores factorise both bodies at the same time, and Newton's method follows. The linear solve
+is one direct solve of the same two bodies, glued together at the contact nodes, with a given motion of the plate. It has the same solver
+and ordering, and one forward and backward substitution. Times are medians of {REPEATS} runs in turn, with `OMP_NUM_THREADS=1`. The
+second ratio counts the seconds of both threads.
 
 {{ratios}}
 
-Friction can cost less than a linear solve: two bodies apart have shorter separators than both together, and they share no
-factor, so that each has its own core. What friction itself adds are the steps between `factorise` and the certificate:
+Friction can cost less than a linear solve. The factors of two separate bodies are smaller than those of both bodies together, and each body has
+a core of its own. What friction itself adds are the steps between `factorise` and the certificate:
 
 {{phases}}
 """

@@ -151,19 +151,23 @@ def tangential(n: int) -> list[dict[str, object]]:
     return rows
 
 
-TEXT = """Cold start, one BLAS thread, medians of {repeats} runs, every answer brought to a natural-map residual of 1e-8
-where its method can: of the accuracies 1e-7, 1e-8, 1e-9 a backend is asked for the loosest whose answer is certified, and
-the tightest where none is. "times ours" is the ratio to the first row of the same size.
+TEXT = """How fast are the methods of contactopt beside general solvers, if Q is a dense matrix? Every run has a cold start and one BLAS thread. Times are medians
+of {repeats} runs. Every answer is brought to a natural-map residual of 1e-8 if its method can do that. A backend is asked
+for the accuracies 1e-7, 1e-8 and 1e-9. The table has the loosest one whose answer is certified, or the tightest one if none is. The column
+"times ours" is the ratio to the first row of the same size.
 
 ## Normal problem
-Half-plane with logarithmic kernel, Hertz's gap, half the nodes in contact, no balance row; all unknowns dense. Backends that
-are much slower than the others are not run at the largest size.
+
+This is contact without friction on a half-plane, with the gap of Hertz. The kernel is logarithmic, so all unknowns are coupled. Half of the nodes are
+in contact, and no force balance is asked for. Backends that are much slower than the others are not run at the largest size.
 
 {normal}
 
 ## Tangential problem
-Cerruti's kernel on a square grid, two unknowns per disc, 12 % of the radii zero, under half of the discs slip. The backend's
-time includes cvxpy's compilation; without a balance row.
+
+This is friction under given normal forces on a square grid, with Cerruti's kernel. Every node has a disc with two unknowns. 12 % of
+the discs have the radius zero, and under half of the discs slip. No force balance is asked for. The time of a backend includes the
+compilation by cvxpy.
 
 {tangential}
 """

@@ -241,53 +241,53 @@ def findings(rows: list[dict], ripple: list[dict]) -> str:
     table = cheapest(rows)
     said = []
     for target in (f"{100 * t:g} %" for t in TARGETS):
-        for what, word in (("fewest unknowns", "the fewest unknowns"), ("least time", "the least time")):
+        for what, word in (("fewest unknowns", "fewest unknowns are needed"), ("least time", "least time is needed")):
             won = [
                 f"{r['case']}, {r['quantity']}: {r[what]}" for r in table if r["error"] == target and r[what] != "none"
             ]
-            said.append(f"- At {target}, {word}: {'; '.join(won)}.")
+            said.append(f"- For an error of {target} the {word} by these elements: {'; '.join(won)}.")
     for case in ("sphere", "sphere 3D"):
         own = {r["element"]: float(r["ripple"]) for r in ripple if r["case"] == case}
         other = own.pop("P2, contacts at all nodes")
         worst = max(own, key=lambda k: own[k])
         said.append(
             f"- {case}: on the finest meshes the pressure within {INNER:g} a scatters by {100 * own['P2']:.2g} % of the "
-            f"peak on quadratic simplices, {100 * own['Q2']:.2g} % on quadratic bricks (most on {worst}, "
-            f"{100 * own[worst]:.2g} %); with contacts at all nodes of quadratic simplices it would be {100 * other:.2g} %."
+            f"peak on quadratic simplices, and by {100 * own['Q2']:.2g} % on quadratic bricks. It scatters most on {worst}, by "
+            f"{100 * own[worst]:.2g} %. If all nodes of quadratic simplices were contacts, it would be {100 * other:.2g} %."
         )
     return "\n".join(said)
 
 
-TEXT = """A rigid sphere and a rigid flat disc on a half-space, frictionless, E = 5 MPa, nu = .3; axisymmetric (body of
-3,000 contact radii, whose part in the approach, {size:.3f} % on the disc, found with one ten times as large, is taken out)
-and 3D (quarter model of 20 contact radii, no approach). Q: quadrilaterals or hexahedra, P: the same cut into
-triangles or tetrahedra, with the degree of the displacement. n elements across the contact half-width, all others in
-proportion. Errors are relative to the exact values. Time: of the processor, from meshes in hand to the certified
-solution, one core.
+TEXT = """Which elements should you take? A rigid sphere and a rigid flat disc press on a half-space without friction, with E = 5 MPa and nu = .3. The scenes are
+axisymmetric or in 3D. The axisymmetric body is 3,000 contact radii large. Its finite size changes the approach, by {size:.3f} % on the disc. A body ten times
+as large shows this, and the change is taken out. The body in 3D is a quarter model of 20 contact radii, and its approach is not compared.
+
+Q stands for quadrilaterals or hexahedra. P stands for the same elements cut into triangles or tetrahedra. The number behind the letter
+is the degree of the displacement. n is the number of elements across the contact half-width, and all other elements are in proportion. Errors are relative to the exact values. The
+time is that of the processor with one core, from finished meshes to the certified solution.
 
 {findings}
 
-**Cost of an accuracy**: unknowns (and seconds) from which on the error stays below the target, between two runs by a
-power law; - not reached on these meshes.
+**Cost of an accuracy.** The table has the number of unknowns (and the seconds) from which on the error stays below the target. Between two
+runs a power law is assumed. The sign - means that these meshes do not reach the target.
 
 {cheapest}
 
-**Measured orders** in 1/n between the two finest meshes. Where contact ends by itself the displacement has 3/2
-derivatives in the energy norm: the approach can gain 2 at degree 1 and at most 3 at degree 2; the tractions 1 in L2
-at both. At the edge of the disc it has 1/2: order 1 of the approach at any degree on even elements. On graded ones it
-is 2 at degree 1; at degree 2 the displacement allows 4, the piecewise linear tractions of the dual basis promise 3
-only. The peak at degree 1 is that of the node next to the axis, where linear elements of a ring are poor. Where an
-error changes its sign, a slope means nothing.
+**Measured orders** in 1/n, between the two finest meshes. What orders can be expected? Where contact ends by itself, the displacement has 3/2
+derivatives in the energy norm. Then the approach can gain the order 2 at degree 1, and at most 3 at degree 2. The tractions can gain 1 in L2
+at both degrees. At the edge of the disc the displacement has 1/2 of a derivative. On even elements this gives the order 1 of the approach at any degree. On
+graded ones the order is 2 at degree 1. At degree 2 the displacement allows 4, but the piecewise linear tractions of the dual basis
+promise 3 only. At degree 1 the peak is that of the node next to the axis, where linear elements of a ring are poor. Where an error changes
+its sign, a slope means nothing.
 
 {orders}
 
-**Ripple**: standard deviation of the error of the nodal pressures within .6 of the contact radius, over the peak
-pressure.
+**Ripple.** The ripple is the standard deviation of the error of the nodal pressures within .6 of the contact radius, over the peak pressure.
 
 {ripple}
 
-**Figure**: error against displacement unknowns; dotted: 1 % and .1 %. Blue squares: quadrilaterals and hexahedra, red
-triangles: triangles and tetrahedra; dashed and hollow: degree 1, solid: degree 2.
+**The figure** shows the error against the displacement unknowns. The dotted lines are 1 % and .1 %. Blue squares are quadrilaterals and
+hexahedra, and red triangles are triangles and tetrahedra. Dashed lines and hollow marks are degree 1, and solid ones are degree 2.
 
 **All runs.**
 

@@ -64,9 +64,12 @@ def measure(jobs: int) -> dict[str, object]:
     }
 
 
-TEXT = """A method that returns zeros at once, on ten problems of ten contacts. The overhead counts everything but the method's
-own call: starting the workers, building problems, handing over runs, certificates, rows on disk, and the Parquet file at the
-end. On a busy machine the CPU time, of workers and parent together, tells more than the wall time. Memory is resident; the parent's grows by Pandas and the table of all rows.
+TEXT = """How much time does the benchmark harness add to a run? A method that returns zeros at once is run on ten problems of ten contacts. The
+overhead is everything but the method's own call: the start of the worker processes, the making of the problems, the messages between processes, the
+certificates, the rows on disk, and the Parquet file at the end.
+
+On a busy machine the CPU time of the workers and the parent process together tells more than the wall time. The memory is resident
+memory. That of the parent process grows by the package Pandas and by the table of all rows.
 
 {rows}
 """

@@ -98,21 +98,23 @@ def draw(loop: list[dict], load: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """The half sphere (R = 400 mm) on a foundation (800 x 800 mm), both E = 5 MPa, nu = .3, 100 N, mu = .5, at the
-default 32 elements across the contact radius.
+TEXT = """How accurate is Hertz contact, and what does the adaptation of the contact zone bring? The scene is the half sphere (R = 400 mm) on
+a foundation (800 x 800 mm). Both have E = 5 MPa and nu = .3. The force is 100 N and mu = .5. There are 32 elements across the
+contact radius, which is the default.
 
 {default}
 
-**The zone loop.** Signed errors against Hertz on meshes with the same number of contact nodes: with the loop (the
-zone's edge is a node), and on a zone meshed 1.25 times too wide. Reading the radius off the nodes in contact is a
-matter of luck within half an element. The zero of a parabola through p^2, which is the half-width that a run reports, has an error
-that falls smoothly, with and without the loop. Remeshing puts every element to use.
+**The zone loop.** The *zone loop* meshes the scene again until the edge of the contact zone is a node of the mesh. The table has the
+signed errors against Hertz on meshes with the same number of contact nodes: with the loop, and on a zone that is meshed 1.25
+times too wide. If the radius is read off the nodes in contact, its error is a matter of luck, within half an element. A run reports another
+half-width: it fits a parabola to the squares of the pressures, and takes the zero of this parabola. Its error falls
+smoothly, with and without the loop. With the loop every element of the zone is used.
 
 {loop}
 
-**Finite bodies.** The sphere is no half-space: at fixed resolution (64 elements across the radius, R = 200 mm) the
-deviations of peak pressure and approach fall with a / R. That of the radius stays near the error of reading it on 64 elements,
-which the table above shows.
+**Finite bodies.** The sphere is no half-space. At a fixed resolution (64 elements across the radius, R = 200 mm) the deviations of the
+peak pressure and of the approach fall with a / R. The deviation of the radius stays near the error of reading it on 64
+elements, which the table above shows.
 
 {load}
 """

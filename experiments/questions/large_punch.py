@@ -153,22 +153,26 @@ def draw(rows: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """punch-3d from cold, to a certificate of 1e-8, both bodies by multigrid, `elements` across the half-width of the punch.
-Ways: `coupled` is Newton's method on displacements and contact forces at once; `products` is Newton's method by products with
-Q, each of which solves with both bodies. V-cycles are those of both bodies together, without those inside products. Every run
-has a process of its own with one BLAS thread; memory is its peak. Set-up is the assembly and the hierarchies. Other programs had
-a share of the two cores, so CPU times are to be compared, not wall times.
+TEXT = """What does friction cost beside one linear solve, on large bodies? The scene is punch-3d with `elements` elements across the half-width of the
+punch. It is solved from a cold start to a certificate of 1e-8. Both bodies are solved by multigrid.
+
+There are two ways. `coupled` is Newton's method on displacements and contact forces at once. `products` is Newton's method that takes
+products with Q, and each of these products solves with both bodies. V-cycles are the steps of multigrid. The column counts those of
+both bodies together, without the V-cycles inside products. Set-up is the assembly and the making of the multigrid hierarchies. Every
+run has a process of its own with one BLAS thread, and the memory is the peak of this process. Other programs had a share of the two
+cores. Compare CPU times, therefore, and not wall times.
 
 {sizes}
 
-Growth of the CPU time of `coupled` with the unknowns: exponent {slope} (least squares over all sizes at mu = .5).
-CPU time of the frictional problem over that of one linear solve with both bodies (a product with Q at 1e-8), set-up included in
-both, at mu = .5: {ratios}.
-V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to {most}, over all sizes and mu.
-CPU time of `products` over that of `coupled`, set-up included: {faster}.
+- The CPU time of `coupled` grows with the unknowns, with the exponent {slope} (least squares over all sizes at mu = .5).
+- CPU time of the frictional problem over that of one linear solve with both bodies (a product with Q at 1e-8), set-up included in
+  both, at mu = .5: {ratios}.
+- V-cycles of the whole frictional solve over those of one product with Q at 1e-8: {least} to {most}, over all sizes and mu.
+- CPU time of `products` over that of `coupled`, set-up included: {faster}.
 
-Wall over CPU time of every phase: one half is the best that two cores can reach. With real-time priority, so that other
-programs do not disturb; threads are those that share bodies and products, and BLAS has one thread except in the last columns.
+The last table has the wall time over the CPU time of every phase. One half is the best that two cores can reach. These runs had real-time
+priority, so that other programs did not disturb them. The threads are those that share the bodies and the products. BLAS has one
+thread, except in the last columns.
 
 {phases}
 """

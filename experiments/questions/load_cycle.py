@@ -83,22 +83,22 @@ def draw_growing(rows: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """**A cycle of shear.** Two bodies of one material, 3D, pressed by 100 N and sheared to and fro by .9 of the
-friction bound. External work = elastic energy + friction work + error of the steps holds to rounding at every step.
+TEXT = """**A cycle of shear.** Two bodies of one material, in 3D, are pressed by 100 N and sheared to and fro by .9 of the friction bound. At every
+step the energies balance to rounding: external work = elastic energy + friction work + error of the steps.
 
 ![film](film.gif)
 
-How many states a cycle needs (plane strain, T = .9 mu P). The loss over the closed cycle from the first +T against
-the exact one: the friction work of implicit steps is right even for few steps from turn to turn, because slip goes one
-way between turns; the loop's area, drawn through few states, is what suffers.
+**How many states does a cycle need?** The scene is in plane strain with T = .9 mu P. The table compares the loss over the closed cycle, from the first
++T on, with the exact one. The friction work is right even with few steps from turn to turn, because slip goes one way between turns. The
+area of the loop becomes worse with few states, because it is drawn through them.
 
 {cycles}
 
-**Growing contact of dissimilar bodies.** A rigid sphere on an elastic half-space (nu = .3): with friction the stick
-zone is a fixed share of the contact, which one large step misses by far. The load grows to 100 N so that the radius
-grows evenly; 160 elements across the last radius. c/a is the mean over the last eighth of the increments. The error is
-about of first order in the increment: a point that stops slipping within a step keeps the displacement it had at the
-step's start.
+**Growing contact of dissimilar bodies.** A rigid sphere is pressed on an elastic half-space (nu = .3). With friction the stick zone is a
+fixed share c/a of the contact, and one large step misses this share by far. The load grows to 100 N in such a way that the contact radius grows
+evenly. There are 160 elements across the last radius. c/a is the mean over the last eighth of the increments. The error is about of
+first order in the increment, because a point that stops slipping within a step keeps the displacement that it had at the start of
+the step.
 
 {increments}
 """

@@ -65,13 +65,14 @@ def friction(name: str) -> dict[str, object]:
     return row
 
 
-TEXT = """Method `auto` (Newton's method converges alone in all of these), certificate 1e-8, one BLAS thread. Cold: from the
-bonded solution, whose computation counts in the time, not as a step. Warm: from the tractions on the mesh before, half as
-fine. The first iterate is the start itself.
+TEXT = """How many steps does Newton's method take? The method is `auto`. In all of these problems its first part, Newton's method, converges alone. The
+certificate is 1e-8, and BLAS has one thread. A *cold* run starts from the solution of bonded surfaces. The time includes this solution,
+but it does not count as a step. A *warm* run starts from the tractions on the mesh before, which is half as fine. The first iterate is
+the start itself.
 
 {steps}
 
-The three scenes at default size: status, Newton steps, certificate.
+The second table has the three scenes at their default size: status, Newton steps, certificate.
 
 {friction}
 """

@@ -17,7 +17,7 @@ RUBBER = Material(5.0, 0.3)
 EVEN = np.linspace(-2.0, 2.0, 65)
 ROOM = "contactopt.solving.preconditioners"
 # The same numbers as a half-space and slowly varying meshes have them, without any fit.
-UNFITTED = {f"{ROOM}.neumann": {"SOFT": 0.0}, f"{ROOM}.grid": {"CELL": 0.5, "EDGE": 0.0}}
+UNFITTED = {f"{ROOM}.neumann": {"DISPERSION": 0.0}, f"{ROOM}.grid": {"CELL": 0.5, "EDGE": 0.0}}
 CHOICES = ("none", "p21", "neumann, no constant fitted", "neumann")
 
 
@@ -152,15 +152,16 @@ def helped(rows: list[dict[str, object]]) -> str:
     return f"{better} of {len(pairs)}"
 
 
-TEXT = """The constants of `neumann` (`contactopt/solving/preconditioners/constants.py`) were fitted on the bodies of
-[Preconditioners](../preconditioners.md). Here the preconditioner meets bodies that had no part in that: condition number
-(PCG iterations from a random right-hand side to 1e-8), smooth motions deflated except in the column "none".
+TEXT = """Does the preconditioner `neumann` also work on bodies that it was not fitted on? Its constants (`contactopt/solving/preconditioners/constants.py`)
+were fitted on the bodies of [Preconditioners](../preconditioners.md). Here it meets bodies that had no part in the fit. The entries are condition
+numbers, with the iterations of preconditioned conjugate gradients from a random right-hand side to 1e-8 in brackets. Smooth motions are
+deflated (solved for exactly), except in the column "none".
 
 1. **In the plane** the worst of {plane_count} unseen pairs has condition {plane_worst} and takes {plane_steps} iterations; the pair
    that was fitted on takes {plane_fitted}. Without any fitted constant the worst is {plane_free}. The fit helps on {plane_helped}.
 2. **In space** the worst of {space_count} unseen pairs has condition {space_worst} and takes {space_steps} iterations; the pair
    that was fitted on takes {space_fitted}. Without any fitted constant the worst is {space_free}. The fit helps on {space_helped}.
-3. What is worst is {plane_name} in the plane and {space_name} in space.
+3. The worst pair is {plane_name} in the plane and {space_name} in space.
 
 **In the plane**, 65 contacts:
 
@@ -170,7 +171,7 @@ TEXT = """The constants of `neumann` (`contactopt/solving/preconditioners/consta
 
 {space}
 
-"neumann, no constant fitted" has SOFT = 0, CELL = 1/2 and EDGE = 0.
+"neumann, no constant fitted" has DISPERSION = 0, CELL = 1/2 and EDGE = 0.
 """
 
 

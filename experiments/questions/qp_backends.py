@@ -63,13 +63,14 @@ def in_all_units(name: str) -> dict[str, object]:
     return row
 
 
-TEXT = """The default `punch-2d` problem (17 contacts, mu = .5), normal and tangential problem both by the same backend at
-the tight settings of contactopt.solving.backends, certified at 1e-9. Differences are relative to a solve at 1e-13.
-"Without crossover" takes the backend's answers as they come, for at most 40 iterations.
+TEXT = """Do all solvers of quadratic programs lead to the same answer? The problem is the default `punch-2d` (17 contacts, mu = .5). The same backend
+solves its normal and its tangential problem, at the tight settings of contactopt.solving.backends. The answer is certified at
+1e-9. Differences are relative to a solve at 1e-13. contactopt makes the answer of a backend exact by a few more steps, which is called
+crossover. "Without crossover" takes the answers of the backend as they come, for at most 40 iterations.
 
 {rows}
 
-The normal problems (mu = 0) of the three scenes, certificate 1e-10, with the input written in other units:
+The next table has the normal problems (mu = 0) of the three scenes, with the certificate 1e-10 and the input written in other units:
 
 {units}
 """

@@ -181,33 +181,35 @@ def coupled_traffic(team: Team, height: float) -> dict[str, Any]:
     }
 
 
-TEXT = """`contactopt run SCENE --ranks N` deals the bodies of a scene out to N processes. Each process assembles its bodies and
-solves their linear systems. Rank 0 iterates on the contact forces, and only vectors on the interfaces travel.
+TEXT = """Does a second process make a scene faster? `contactopt run SCENE --ranks N` divides the bodies of a scene among N processes, which are called ranks. Each process assembles its
+bodies and solves their linear systems. Rank 0 iterates on the contact forces, and only vectors on the interfaces travel.
 
 ## Two bodies of equal size on two ranks
 
-Reduction and solution to a residual of 1e-8, set-up included, one BLAS thread. The critical path is the longest chain of work
-that waits for other work, in CPU seconds, from clocks that the messages carry; what else the machine was doing counts only as far
-as programs take caches and memory from each other. Efficiency is the time of one process over twice that of two ranks. The wall times are
-those of the same run; they also contain what the ranks sleep between two looks for a message, and the share of the cores that other
+The times are those of reduction and solution to a residual of 1e-8, with the set-up and with one BLAS thread. The *critical path* is the longest
+chain of work that waits for other work. It is measured in CPU seconds, by clocks that the messages carry. Other programs influence it only as far
+as programs take caches and memory from each other. *Efficiency* is the time of one process over twice that of two ranks. The wall times are
+those of the same run. They also contain what the ranks sleep between two looks for a message, and the share of the cores that other
 programs take.
 
 {efficiency}
 
-The aim is 75 % in every case. What is lost on the critical path are the steps on the interface, which rank 0 makes alone while the
-other waits: the model of Q in the preconditioner, the dense system, the coupling of the surfaces.
+The aim is 75 % in every case. The time that is lost on the critical path is that of the steps on the interface. Rank 0 makes these steps
+alone while the other rank waits: the model of Q in the preconditioner, the dense system, the coupling of the surfaces.
+
 
 ## What travels
 
-A punch on a foundation that is cut into slices tied to each other, one body on each rank; more ranks than cores. The
-higher foundation has more unknowns within its slices and the same interfaces. With factors, a product with Q is one order to each
-rank and its reply; an array Q is made once, and the steps send nothing.
+A punch stands on a foundation that is cut into slices tied to each other. Each rank has one body, and there are more ranks than cores. The
+higher foundation has more unknowns within its slices and the same interfaces. With factors, a product with Q takes one order to each rank,
+and its reply. An array Q is made once, and then the steps send nothing.
 
 {traffic}
 
-With multigrid the displacements stay on their ranks. The steps of the Krylov method send an order for each operation on them, and
-receive scalar products and traces on the interface. How many V-cycles slices of any height need is measured by
-`python -m experiments.questions.several_pairs`:
+With multigrid the displacements stay on their ranks. The steps of the Krylov method (an iteration such as conjugate gradients) send an
+order for each operation on them, and receive scalar products and displacements on the interface. How many V-cycles slices of any height
+need is measured by `python -m experiments.questions.several_pairs`:
+
 
 {coupled}
 """

@@ -73,9 +73,12 @@ def draw(rows: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """`contactopt run SCENE --method METHOD` at default size, each in its own process, from the start of Python to the last file. Medians
-of three runs, seconds; peak resident memory. cvxpy is imported (about a second, within "solve") only where
-the alternating iteration meets discs. Assembly and factorisation of the two bodies run on two threads.
+TEXT = """Where do time and memory of a run go? `contactopt run SCENE --method METHOD` is measured at its default size. Each run has a process
+of its own, and the time counts from the start of Python to the last file. The table has medians of three runs in seconds, and the
+peak of the resident memory.
+
+The package cvxpy is imported only where the method `alternating` has to solve programs over discs. This import takes about a second,
+which counts as "solve". Two threads assemble and factorise the two bodies.
 
 {rows}
 """

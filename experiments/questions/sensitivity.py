@@ -309,36 +309,37 @@ def table(part: str, rows: list[dict[str, Any]]) -> None:
         writer.writerows(rows)
 
 
-TEXT = f"""`contactopt.sensitivity` and `contactopt.gradient` against central differences of solved problems. A relative error is the largest
-over all forces, over the largest derivative of a force.
+TEXT = f"""Are the derivatives of certified solutions right, and what do they cost? `contactopt.sensitivity` and `contactopt.gradient` are compared with
+differences of solved problems. A relative error is the largest error over all forces, over the largest derivative of a force.
 
 {{random}}
 
-{PROBLEMS} random problems in each dimension, with a positive definite Q (every third unsymmetric), every second with a plate. Left out are
-problems that were not solved to 1e-12, and those with a contact nearer than 1e-4 of the largest force to a kink, where the two ends
-of a difference may lie on different pieces.
+There are {PROBLEMS} random problems in each dimension, compared with central differences. Their Q is positive definite, and every third Q is not symmetric. Every second
+problem has a plate. Two kinds of problems are left out: those that were not solved to 1e-12, and those with a contact nearer to a kink
+than 1e-4 of the largest force. There the two ends of a difference may lie on different pieces of the solution.
 
-At kinks, where three contacts are weakly active by construction, one-sided differences with the step 1e-7:
+**At kinks.** Here three contacts are weakly active by construction: they are just between open and closed, or between stick and slip. One-sided differences have the step 1e-7:
 
 {{kinks}}
 
-Through the reduction of scenes, by parameters of people. Of two central differences, with the relative steps 1e-4 and 1e-5, the nearer one
-counts; derivatives far below the size of the quantity are compared with a thousandth of it. `shear_force`, `energy` and others in
-units of N and mm:
+**Scenes.** These are derivatives with respect to the parameters of a scene. There are two central differences, with the relative steps 1e-4
+and 1e-5, and the nearer one counts. Derivatives that are far below the size of the quantity are compared with a thousandth of it. `shear_force`,
+`energy` and the others are in units of N and mm:
 
 {{scenes}}
 
-What it costs, in CPU seconds, medians on a shared machine, `OMP_NUM_THREADS=1`. The gradient by all data (q, mu, s, Q, V) of one function is one
-factorisation with one solve, or one coupled linear solve to the relative accuracy 1e-11, and the certificate of the solution. The whole
-solve shares one factorisation among its steps (dense), and solves its linear systems to one or two digits only (multigrid), so that
-the average step is much cheaper than a step that stands alone. The aim was one dense step that factorises, and it is missed: about half of
-the time of the gradient is spent around the factorisation, on the dimensionless copy of Q, the check of the certificate and the bonded
-system's own check of symmetry:
+**Cost.** The table has CPU seconds, medians on a shared machine, with `OMP_NUM_THREADS=1`. The gradient of one function by all data (q, mu,
+s, Q, V) takes one factorisation with one solve, or one coupled linear solve to the relative accuracy 1e-11. It also takes the certificate
+of the solution. The whole solve is cheaper per step than a step that stands alone: with a dense Q its steps share one
+factorisation, and with multigrid its linear systems are solved to one or two digits only. The aim was the time of one dense step
+that factorises. This aim is missed. About half of the time of the gradient is spent around the factorisation: on the dimensionless
+copy of Q, on the check of the certificate, and on the check whether the bonded system is symmetric.
 
 {{costs}}
 
-One adjoint solve against one-sided differences with warm starts, for sixteen shapes of the gap and four constants of materials. A
-difference by the gap solves the interface problem again, one by a constant also reduces the bodies again:
+**One adjoint solve against many differences.** The parameters are sixteen shapes of the gap and four constants of materials. The differences
+are one-sided and have warm starts. A difference by the gap solves the interface problem again. A difference by a constant also reduces the
+bodies again:
 
 {{twenty}}
 """

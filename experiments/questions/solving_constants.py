@@ -1,8 +1,12 @@
-"""What is each number of contactopt.solving.constants worth? Half and twice of it, one at a time, over problems of three kinds."""
+"""What is each number of contactopt.solving.constants worth? Half and twice of it, one at a time, over problems of several kinds.
+
+Names of constants after the command choose some of them. Their rows are then printed, and no report is written.
+"""
 
 from __future__ import annotations
 
 import os
+import sys
 
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
@@ -15,6 +19,8 @@ from typing import Any  # noqa: E402
 
 from contactopt import InterfaceProblem, reduce, scenes, solve  # noqa: E402
 from contactopt.solving import constants  # noqa: E402
+from contactopt.solving.methods import find_method  # noqa: E402
+from contactopt.solving.methods.nested import Nested  # noqa: E402
 from experiments.questions.granular import packing  # noqa: E402
 from experiments.questions.robustness import rigid_bodies  # noqa: E402
 from experiments.report import write  # noqa: E402
@@ -22,7 +28,7 @@ from experiments.report import write  # noqa: E402
 HOME = "contactopt.solving"
 USERS = {  # names of constants -> module that uses them, method that is run, kinds of problems that feel them
     (
-        "NEWTON_STEPS PATIENCE PROGRESS CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND PATHS GENTLE_ALPHA LARGER"
+        "NEWTON_STEPS PATIENCE PROGRESS CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND PATHS TURNING GENTLE_ALPHA LARGER"
     ): (
         "methods.auto",
         "auto",
@@ -33,8 +39,33 @@ USERS = {  # names of constants -> module that uses them, method that is run, ki
     "LOOSE": ("kernels.alart_curnier", "newton", ("elastic",)),
     "SMALL FULL": ("kernels.sparse_blocks", "auto", ("packing",)),
     "SHARPER SHARPEST": ("methods.apg", "apg", ("coarse",)),
+    (
+        "FRICTIONLESS ROUGHEST INTERIOR_STEPS STALLED INTERIOR_PROGRESS START LEAST_SMOOTHING MOST_SMOOTHING PREDICTED "
+        "BOUNDARY SHORT STUCK CORRECTED LEAST_CENTERING MOST_CENTERING STUCK_CENTERING CENTRAL CENTRAL_KEPT BACKTRACK"
+    ): ("kernels.interior", "auto", ("rigid", "packing")),
+    "KRYLOV_LOOSEST KRYLOV_TIGHTEST": ("kernels.alart_curnier", "newton", ("products",)),
+    "PRODUCT_SHARE MODEL_STEP MODEL_PRODUCTS": ("kernels.krylov", "newton", ("products",)),
+    "SLIPPING": ("kernels.linearised", "newton", ("products",)),
+    "ACTIVE_SETS SUCCESS WEIGHT_FALL WEIGHT_RISE": ("kernels.subproblems", "pcg", ("products",)),
+    "COUPLED_FIRST COUPLED_LOOSEST COUPLED_TIGHTEST SCHUR_STEP SCHUR_MARGIN": (
+        "kernels.coupled",
+        "newton",
+        ("bodies",),
+    ),
+    "COARSEST LEAST_SYMBOL LEAST_DETERMINANT FIRST_SHIFT SHIFT_RATIO": ("kernels.levels", "nested", ("half-spaces",)),
+    "NESTED_LOOSEST NESTED_TIGHTEST COARSE_ENOUGH COARSEST_ENOUGH COARSE_STEPS": (
+        "methods.nested",
+        "nested",
+        ("half-spaces",),
+    ),
+    "EIGENVALUE_MARGIN ROWS_FALL ROWS_SHARE FINEST_SHARE STIFFER": ("kernels.mprgp", "lagrangian", ("coarse",)),
+    "ROUGH_NORMAL": ("methods.lagrangian", "lagrangian", ("coarse",)),
+    "FIRST_BALANCING MOST_CHANGE LEAST_CHANGE": ("methods.admm", "admm", ("coarse",)),
 }
+# methods with settings, or without a name of their own
+BUILT = {"pcg": find_method("alternating", normal="pcg", tangential="pcg"), "nested": Nested()}
 LIMIT = 1000  # iterations per problem
+NEAR_ONE = 0.8  # shares from here to one are changed by their distance from one
 
 
 def problems() -> dict[str, list[InterfaceProblem]]:
@@ -43,7 +74,19 @@ def problems() -> dict[str, list[InterfaceProblem]]:
     spheres = [reduce(scenes.sphere(mu=mu, elements=n)) for mu in (0.1, 0.5) for n in (32, 128)]
     rigid = [rigid_bodies(seed, 10, 40, mu) for seed in range(3) for mu in (0.3, 1.0, 3.0)]
     grains = [packing(dim, 40, seed, mu, points) for seed in range(2) for dim, mu, points in ((2, 0.3, 1), (3, 0.8, 2))]
-    return {"elastic": punches + spheres, "coarse": punches[::2] + spheres[::2], "rigid": rigid, "packing": grains}
+    scenes_of_products = (scenes.flat_punch(2, mu=0.5), scenes.sphere(mu=0.5))
+    products = [reduce(scene, elements=n, Q="implicit") for scene in scenes_of_products for n in (32, 128)]
+    bodies = [reduce(scenes.flat_punch(3, mu=mu), elements=6, solver="multigrid") for mu in (0.1, 0.5)]
+    made = (scenes.hertz_half_space(), scenes.cattaneo_half_space(), scenes.rough())
+    return {
+        "elastic": punches + spheres,
+        "coarse": punches[::2] + spheres[::2],
+        "rigid": rigid,
+        "packing": grains,
+        "products": products,
+        "bodies": bodies,
+        "half-spaces": [reduce(scene) for scene in made],
+    }
 
 
 @contextmanager
@@ -61,18 +104,23 @@ def setting(name: str, value: Any) -> Iterator[None]:
 def cost(method: str, asked: list[InterfaceProblem]) -> tuple[int, float]:
     """How many of the problems are certified, and the processor seconds of all."""
     start = time.process_time()
-    solved = sum(solve(problem, method, max_iterations=LIMIT).solved for problem in asked)
+    solved = sum(solve(problem, BUILT.get(method, method), max_iterations=LIMIT).solved for problem in asked)
     return solved, time.process_time() - start
 
 
-def measure() -> list[dict[str, Any]]:
-    """One row for each constant."""
+def changed(value: Any, factor: float) -> Any:
+    """That many times the value; of a share near one that many times its distance from one."""
+    return 1 - factor * (1 - value) if NEAR_ONE <= value < 1 else type(value)(factor * value)
+
+
+def measure(chosen: list[str]) -> list[dict[str, Any]]:
+    """One row for each of the chosen constants; for every one if none is chosen."""
     rows: list[dict[str, Any]] = []
     sets = problems()
     known: dict[tuple[str, tuple[str, ...]], tuple[int, float]] = {}
     for names, (_, method, kinds) in USERS.items():
         asked = [problem for kind in kinds for problem in sets[kind]]
-        for name in names.split():
+        for name in (name for name in names.split() if name in chosen or not chosen):
             value = getattr(constants, name)
             if (method, kinds) not in known:
                 known[method, kinds] = cost(method, asked)
@@ -80,25 +128,30 @@ def measure() -> list[dict[str, Any]]:
             row = {"constant": name, "value": value, "method": method, "certified": f"{solved} of {len(asked)}"}
             row["seconds"] = seconds
             for label, factor in (("half", 0.5), ("twice", 2.0)):
-                with setting(name, type(value)(factor * value)):
-                    changed, taken = cost(method, asked)
-                row |= {f"{label}: certified": changed, f"{label}: time": taken / seconds}
+                with setting(name, changed(value, factor)):
+                    count, taken = cost(method, asked)
+                row |= {f"{label}: certified": count, f"{label}: time": taken / seconds}
             rows.append(row)
             print(row, flush=True)
     return rows
 
 
 TEXT = """Every number of `contactopt.solving.constants` at half and at twice its value, one at a time: how many problems are certified
-(residual at most 1e-8, at most {limit} iterations), and the processor time over that with the value itself. The problems: {elastic} of elastic
-bodies (`punch-2d` and `sphere`, of which the {coarse} coarse ones for `apg`), {rigid} of random rigid bodies, {packing} packings of rigid bodies with a sparse Q; one run each,
-one thread; the same run twice differs by up to {noise:.0%}.
+(residual at most 1e-8, at most {limit} iterations), and the processor time over that with the value itself. Of shares near one the
+distance from one is halved and doubled. The problems: {elastic} of elastic
+bodies (`punch-2d` and `sphere`, of which the {coarse} coarse ones for `apg`), {rigid} of random rigid bodies, {packing} packings of rigid bodies with a sparse Q, {products} of elastic bodies known by products
+with Q, {bodies} of bodies that are solved by iteration, {halves} of half-spaces; one run each, one thread; the same run twice differs by up to {noise:.0%}.
 
 {{rows}}
 """
 
 if __name__ == "__main__":
+    if sys.argv[1:]:
+        measure(sys.argv[1:])
+        sys.exit()
     sets = problems()
     counts = {kind: len(asked) for kind, asked in sets.items()}
     twice = [cost("auto", sets["elastic"] + sets["rigid"])[1] for _ in range(3)]
-    text = TEXT.format(limit=LIMIT, noise=max(twice) / min(twice) - 1, **counts)
-    write("solving_constants", "What the numbers of the methods are worth", text, {"rows": measure()}, {})
+    halves = counts.pop("half-spaces")
+    text = TEXT.format(limit=LIMIT, noise=max(twice) / min(twice) - 1, halves=halves, **counts)
+    write("solving_constants", "What the numbers of the methods are worth", text, {"rows": measure([])}, {})

@@ -53,10 +53,13 @@ def draw(rows: list[dict]) -> Figure:
     return figure
 
 
-TEXT = """Rigid flat punch on an elastic foundation clamped below, plane strain, nu = mu = .3. The exact stick ratio on a
-half-plane is {exact:.6f} (Spence's problem, fully coupled). A finite foundation is squeezed and held sideways, which
-lowers the tangential load: the stick zone is too wide until the foundation is about a thousand half-widths wide. On a
-mesh graded away from the contact that costs little.
+TEXT = """How large is the stick zone under a rigid flat punch? The punch presses on an elastic foundation that is clamped below, in plane strain,
+with nu = mu = .3. The *stick ratio* is the half-width of the stick zone over that of the contact. On a half-plane it is exactly
+{exact:.6f} (Spence's problem, fully coupled).
+
+A finite foundation is squeezed and held sideways. This lowers the tangential load, so that the stick zone becomes too wide. Its error vanishes only
+when the foundation is about a thousand half-widths wide. On a mesh that is graded away from the contact, so large a foundation
+costs little.
 
 {{rows}}
 """

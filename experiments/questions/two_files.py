@@ -60,9 +60,9 @@ def processor_seconds() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-TEXT = """A shaft pressed into a hub, two files of Gmsh whose nodes do not match, triangles of second order, one scene file: the page
-*Your own mesh*. The seconds are those of the whole command `contactopt run press-fit.toml`, with the start of Python, the figures and
-the files.
+TEXT = """How long does it take from two mesh files to the figures of the pressure? A shaft is pressed into a hub. The two meshes are files of Gmsh
+with triangles of second order, and their nodes do not match. The page *Your own mesh* has them and the scene file. The
+seconds are those of the whole command `contactopt run press-fit.toml`: the start of Python, the solution, the figures and the files.
 
 {runs}
 """

@@ -117,22 +117,23 @@ def cheapest(m: int, n: int, dim: int, solver: str) -> str:
     return min(ways, key=lambda way: seconds(way, m, n, dim, "multigrid" if way == "coupled" else solver))
 
 
-TEXT = """punch-2d and punch-3d, mu = {mu}, from cold to a certificate of 1e-8 by Newton's method, set-up included: a `dense` Q, `products`
-with Q by the factors of both bodies, or bodies and contact at once (`coupled`) by multigrid. CPU seconds of one run each with one
-thread of BLAS; other programs had a share of the machine. n and m: unknowns of the larger body, and those on its contact surface.
+TEXT = """Which way to the solution is the cheapest? The scenes are punch-2d and punch-3d with mu = {mu}. Newton's method solves them from a cold start to a
+certificate of 1e-8. There are three ways: an array Q (`dense`), `products` with Q by the factors of both bodies, or bodies and contact at
+once by multigrid (`coupled`). Times are CPU seconds of one run each, with the set-up and with one thread of BLAS. Other programs had a share of the
+machine. n is the number of unknowns of the larger body, and m is the number of those on its contact surface.
 
 {{rows}}
 
-Estimates of `contactopt/interface/costs.py`: each a sum of the terms there (`terms`) with the prices of this table, fitted to
-the measured times.
+`contactopt/interface/costs.py` estimates the costs. Each estimate is a sum of the terms there (`terms`), with the prices of this table. The
+prices were fitted to the measured times.
 
 {{fits}}
 
-The maps show the cheapest way by these estimates; rings are measured punches. Along the measured punches in space `coupled` takes less
-time than both others from about {superlu:,} unknowns of the larger body on where the factors are SuperLU's, and from about {pardiso:,}
-where they are PARDISO's; less than half from {half_superlu:,} and {half_pardiso:,}. Factors stay the choice up to there
-(`FACTORS_UP_TO` in `contactopt/bodies/solvers/constants.py`), because they also serve further states of a load path, and methods other than Newton's.
-In the plane it takes less than both others {plane}.
+The maps show the cheapest way by these estimates. The rings are measured punches. In three dimensions, along the measured punches, `coupled` takes
+less time than both other ways from about {superlu:,} unknowns of the larger body on, if the factors are those of SuperLU. With the factors of PARDISO
+this begins at about {pardiso:,}. It takes less than half of their time from {half_superlu:,} and {half_pardiso:,}. contactopt takes factors up to
+there (`FACTORS_UP_TO` in `contactopt/bodies/solvers/constants.py`), because factors also serve further states of a load path, and methods
+other than Newton's. In the plane `coupled` takes less than both others {plane}.
 """
 
 

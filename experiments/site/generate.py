@@ -29,6 +29,7 @@ TUTORIALS = (
     "beat_our_solvers",
     "reading_a_strangers_problem",
     "derivatives_with_kinks",
+    "half_space_or_finite_elements",
 )
 # reports about accuracy; all others are about performance
 ACCURACY = (
@@ -85,8 +86,9 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
                 yield Path("reports", base(path), picture[1]), path.parent / picture[1]
 
 
-TUTORIAL_TEXT = """Each tutorial is a script, a notebook to download, and a page of this site. It takes about ten minutes to read.
-Every claim is asserted in its code, and the exercises have hidden solutions. [The course](course.md) says how to open a notebook.
+TUTORIAL_TEXT = """Each tutorial has one subject. It is a script, a notebook to download, and a page of this site. It takes ten to fifteen minutes
+to read. The code checks every claim by an assertion. The exercises have hidden solutions: click on *Solution* to open one.
+[The course](course.md) says how to open a notebook.
 """
 
 
@@ -100,7 +102,11 @@ def notebook(folder: str, name: str, text: str, head: str = "") -> Iterator[tupl
     offer = f"#\n# {{download}}`Download this page as a notebook <../notebooks/{name}.ipynb>`"
     yield Path(folder, f"{name}.py"), f"{head}# %% [markdown]\n{title}\n{offer}\n{rest}"
     local = re.sub(r"\]\((\w+)\.py\)", r"](\1.ipynb)", text)  # notebooks of one folder refer to each other
-    yield Path("notebooks", f"{name}.ipynb"), jupytext.writes(jupytext.reads(local, "py:percent"), "ipynb")
+    book = jupytext.reads(local, "py:percent")
+    for cell in book.cells:  # what the page folds, JupyterLab folds too
+        if "hide-input" in cell.metadata.get("tags", []):
+            cell.metadata["jupyter"] = {"source_hidden": True}
+    yield Path("notebooks", f"{name}.ipynb"), jupytext.writes(book, "ipynb")
 
 
 def course(site: Path) -> Iterator[tuple[Path, str]]:

@@ -32,21 +32,21 @@ ROOMS = {
     "figures": "Results are drawn here.",
     "adaptivity": "Meshes are refined where the quantity asked for needs it.",
     "derivatives": "Solutions are differentiated here; parameters are fitted to data, profiles and loads are designed.",
-    "analysis": "Here stands what is asked of solved scenes: the contact zone, accuracy, load paths, diagnosis.",
-    "interface": "Two bodies become one interface problem here, and its solution becomes displacements and stresses.",
-    "bodies": "One elastic body: its elements, its stiffness matrix, and the solvers of its linear systems.",
-    "solving": "The driver, the methods, and what methods are built from. Nothing here knows finite elements.",
+    "analysis": "Questions about solved scenes are answered here: the contact zone, accuracy, load paths, diagnosis.",
+    "interface": "The bodies become one interface problem here, and its solution becomes displacements and stresses.",
+    "bodies": "One elastic body is assembled here: its elements, its stiffness matrix, and the solvers of its linear systems.",
+    "solving": "The methods stand here, with the driver that calls them and the parts that they share. Nothing here knows finite elements.",
     "scenes": "A scene says what is modelled: bodies, materials, supports and loads. The named scenes are here too.",
     "models": "The convex programs of the subject are written in cvxpy, as on a blackboard.",
-    "teaching": "What the notebooks of the course share: exercises that grade themselves, and sliders.",
+    "teaching": "The notebooks of the course share these parts: exercises that grade themselves, and sliders.",
     "fclib": "Problems are exchanged with the FCLib collection.",
-    "analytic": "Exact solutions, against which the computed ones are held.",
-    "problem": "The interface problem, its solution and its certificate: optimisation only.",
-    "material": "The two constants of an elastic material.",
-    "files": "Files that are written whole or not at all.",
-    "checks": "Checks of the numbers that a user gives.",
-    "cards": "Results in one line for a terminal, and as small tables for notebooks.",
-    "errors": "The two exceptions of the package.",
+    "analytic": "Exact solutions are computed here, to compare the computed ones with.",
+    "problem": "The interface problem, its solution and its certificate are defined here. This room is about optimisation only.",
+    "material": "An elastic material has two constants, which are defined here.",
+    "files": "Files are written whole or not at all.",
+    "checks": "The numbers that a user gives are checked here.",
+    "cards": "Results are shown in one line on a terminal, and as small tables in notebooks.",
+    "errors": "The exceptions of the package are defined here.",
 }
 
 
@@ -166,19 +166,21 @@ gets the same certificate. The letters and signs are those of [the mathematics](
 SCENES_TEXT = """A named scene is run by `contactopt run NAME` or `contactopt.run("NAME")`. Its arguments are those of the
 function in [`contactopt.scenes`](api/scenes.md) that makes it. A scene with a load path is solved state by state.
 """
-PRECONDITIONERS_TEXT = """A preconditioner is an approximate inverse of the compliance Q. It is chosen by its name:
+PRECONDITIONERS_TEXT = """A preconditioner is an approximate inverse of the compliance $Q$. It makes iterative methods short, where $Q$ is known by its
+products only. It is chosen by its name:
 `contactopt.run("punch-2d", preconditioner="neumann")`, or `--preconditioner neumann` on the command line.
 """
 SOLVERS_TEXT = """A body solver solves the linear system of one elastic body. It is chosen by its name:
 `contactopt.run("punch-2d", solver="superlu")`, or `--solver superlu` on the command line. The default, `auto`, chooses by size.
 """
-LAWS_TEXT = """A law says which forces a contact can carry and how they depend on its motion. The sections below come from the
-table of laws.
+LAWS_TEXT = """A law says which forces a contact can carry, and how these forces depend on its motion. A scene names its law:
+`Scene(..., law="bilateral")`, or `Contact(..., law="bilateral")` for one pair of surfaces. The sections below come from the table of laws.
 """
-COUPLINGS_TEXT = """A coupling ties the displacements of the bodies' contact surfaces to the contacts of the interface problem.
-The sections below come from the table of couplings.
+COUPLINGS_TEXT = """A coupling says how the displacements of two contact surfaces make the relative displacements of the contacts. The
+default, `auto`, takes `matching` if the nodes of the two surfaces match, and `mortar` if they do not.
 """
-BACKENDS_TEXT = """A backend is a solver of quadratic or cone programs that others wrote. It is chosen by its name:
+BACKENDS_TEXT = """A backend is a solver of quadratic or cone programs that others wrote. (A quadratic program has a quadratic cost and linear
+constraints. A cone program may also bound the length of a vector.) A backend is chosen by its name:
 `contactopt.solve(problem, normal="osqp")`, or `--normal osqp` on the command line. The packages that do not come with
 contactopt are installed by `pip install 'contactopt[backends]'` or one by one.
 """

@@ -1,8 +1,9 @@
 # %% [markdown]
 # # 6. A load cycle and its hysteresis
 #
-# Press a cylinder on a flat body. Push it sideways, but not so hard that it slides off. Then pull it back. Does it come
-# back to where it was? It does not, because friction has done work, and the answer depends on the way. Cattaneo (1938) and
+# Press a cylinder on a flat body. Push it sideways, but not so hard that it slides off. Then take the push away. Does the
+# cylinder come back to where it was? It does not, because friction has done work. The answer depends on the loads that came
+# before. Cattaneo (1938) and
 # Mindlin (1949) solved this problem exactly. In this tutorial we solve it numerically, step by step. We compare the slip
 # zones, the tractions and the energy that a cycle costs with the exact ones.
 #
@@ -33,9 +34,10 @@ from contactopt.analytic import cycle_loss_line
 # Two bodies of the same rubber are pressed together with $P = 100$ N. The lower one is flat, and the upper one is round
 # with a radius of 4 m. Perpendicular to the plane of the drawing both have a thickness of $D = 400$ mm. The shear force
 # $T$ on the upper body goes from zero to 40 N, to $-40$ N, and back to 40 N. The bodies would slide off at
-# $\mu P = 50$ N. The normal $n$ points up, and the tangent $t$ points to the right.
+# $\mu P = 50$ N. The normal $n$ points up, and the tangent $t$ points to the right. Every contact has its normal component
+# first.
 
-# %%
+# %% tags=["hide-input"]
 fig, ax = plt.subplots(figsize=(5, 3), layout="constrained")
 across = np.linspace(-2, 2, 101)
 ax.fill_between(across, 0.14 * across**2, 1.6, color="C0", alpha=0.25, lw=0)
@@ -53,7 +55,7 @@ ax.plot([-0.7, 0.7], [0, 0], "C3", lw=4)
 ax.text(0, -0.35, "contact, $-a < x < a$", color="C3", ha="center")
 ax.text(-1.9, 1.3, "rubber, below a rigid plate", color="C0", va="center")
 ax.set(xlim=(-2.1, 3.4), ylim=(-1.0, 2.5), aspect="equal")
-ax.axis("off")
+_ = ax.axis("off")
 
 # %%
 mu, P, T_most, D = 0.5, 100.0, 40.0, 400.0
@@ -116,7 +118,7 @@ x = problem.coordinates[0]
 fine = np.linspace(-a, a, 401)
 turned, home, lowest = 8, 16, 24  # states with T = 40 N, 0, -40 N
 
-fig, ax = plt.subplots(figsize=(6.8, 4.2), layout="constrained")
+fig, ax = plt.subplots(figsize=(6.2, 4.2), layout="constrained")
 for index, color in ((4, "C0"), (turned, "C1"), (home, "C2"), (lowest, "C3")):
     tau = -path.states[index].solution.reactions[:, 1] / problem.areas  # on the lower body
     expected = (
@@ -139,17 +141,17 @@ assert abs(resultant.sum()) < 1e-8 and np.abs(resultant).max() > 0.2
 # %% [markdown]
 # ## The loop
 #
-# We draw the force against the shift of the upper body. The loop is thin, because most of the shift is the elasticity of
-# the large bodies. If we take off the straight line through the tips, the loop opens.
+# We draw the force against the shift of the upper body. The loop is thin, because most of the shift is the elastic
+# deformation of the large bodies. If we subtract the straight line through the two tips, the loop becomes visible.
 
 # %%
 stiffness_line = shift.max() / T_most * T
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
+fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 left.plot(shift, T, "o-", ms=3)
 left.set(xlabel="shift of the plate [mm]", ylabel="shear force T [N]")
 right.plot(1e3 * (shift - stiffness_line), T, "o-", ms=3)
-right.set(xlabel="shift beyond the line through the tips [µm]", ylabel="shear force T [N]")
+right.set(xlabel="shift beyond the line [µm]", ylabel="shear force T [N]")
 
 assert np.allclose(shift[turned], shift[-1], rtol=1e-6)  # the loop closes
 assert abs(shift[home]) > 0.002  # but it does not go through zero
@@ -158,7 +160,7 @@ assert abs(shift[home]) > 0.002  # but it does not go through zero
 # ## What a cycle costs
 #
 # The area of the loop is the energy that friction turns into heat. It does not depend on the size of the bodies, because
-# linear elasticity encloses no area. Let $P' = P / D$ and $T' = T / D$ be the forces per unit of thickness. The shift under
+# the elastic deformation is a straight line in this diagram, and encloses no area. Let $P' = P / D$ and $T' = T / D$ be the forces per unit of thickness. The shift under
 # first loading is
 #
 # $$ \delta(T) = \text{const} \cdot T + \frac{\mu}{\pi E^*}
@@ -245,7 +247,8 @@ assert history["energy_error"].max() < 1e-9
 #
 # </details>
 #
-# **3.** Take two steps instead of eight from zero to the largest force. What suffers: tips, stick zones, or energy?
+# **3.** Take two steps instead of eight from zero to the largest force. What becomes worse: the tips of the loop, the stick
+# zones, or the energy?
 #
 # <details><summary>Solution</summary>
 #

@@ -1,11 +1,11 @@
 # %% [markdown]
 # # 7. Add your own solver and beat ours
 #
-# You have an idea for an algorithm. How good is it? This tutorial writes a method in 20 lines and measures it in a
-# benchmark beside the methods of the package, which need not be changed for that. It does so twice. The first idea turns out
-# to be slow. The second is about as fast as the methods of the package, but on some problems its answers are wrong.
+# You have an idea for an algorithm. How good is it? In this tutorial we write a method in 20 lines, and compare it with the
+# methods of the package in a benchmark. The package need not be changed for this. We do so with two ideas. The first one turns
+# out to be slow. The second one is about as fast as the methods of the package, but on some problems its answers are wrong.
 #
-# Reading time: 10 minutes. You need the [letters](one_contact_node.py) and Newton's method.
+# Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) explains the letters. You should know Newton's method.
 
 # %%
 from pathlib import Path
@@ -25,15 +25,18 @@ folder = TemporaryDirectory()
 #
 # $$ u = Q r + V \lambda + q, \qquad V' r + s = 0, $$
 #
-# with one block for each contact, normal component first; $r$ is the force on the upper body. The method returns $r$, or
-# $(r, \lambda)$. Its settings are arguments of the function. If it has the arguments `tol` and `time_limit`, it gets these
-# two as well. The benchmark does not rely on what the method claims: it computes the certificate of each answer.
+# The components are ordered by contacts, and the normal component of each contact comes first. $r$ is the force on the upper
+# body. The motions of the plates are the columns of $V$, and $V' r + s = 0$ is their balance. The method returns $r$, or
+# $(r, \lambda)$. Its settings are arguments of the function. If it has the arguments `tol` and `time_limit`, it gets the
+# tolerance and the time limit of the benchmark. The benchmark does not rely on what the method says about its success: it
+# computes the certificate of each answer.
 #
-# Methods run in processes of their own, which can be ended when they take too long. Therefore they stand in a file of their
-# own. Here is the first one.
+# Methods run in processes of their own, so that the benchmark can end them if they take too long. Therefore they stand in a
+# file of their own. Here is the first one.
 #
-# **First idea: walk downhill.** The natural map $r \mapsto P_K(r - \rho (u + \mu |u_t| n))$ leaves a solution where it is. So
-# we apply this map again and again. `project_balanced` projects on the cones $K$ and keeps the balance of the plates.
+# **First idea: walk downhill.** Let $K$ be the set of all forces with $|r_t| \le \mu r_n$, and let $P_K$ take a vector to the
+# nearest force in $K$. The map $r \mapsto P_K(r - \rho (u + \mu |u_t| n))$ does not move a solution. So we apply this map again
+# and again. The function `project_balanced` computes $P_K$ and keeps the balance of the plates.
 
 # %%
 FIRST = """
@@ -165,7 +168,7 @@ for method, marker in zip(best.index, "os^D"):
 ax.set_xticks(best.columns + 1, [f"{int(n) + 1}" for n in best.columns])
 ax.minorticks_off()
 ax.set(xlabel="contacts [-]", ylabel="time to a certificate of 1e-8 [ms], best of two")
-ax.legend(frameon=False, loc="center left", bbox_to_anchor=(0, 0.6))
+ax.legend(frameon=False, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 assert share.loc["punch-2d"].drop("walk_downhill").min() == 1.0  # all that counts is certified
 assert best.loc["guess_and_sort"].sum() < best.loc["walk_downhill"].sum()
@@ -186,9 +189,9 @@ assert (loose["status"] == "false_claim").any()
 
 # %% [markdown]
 # Two columns are important. In the column `solved` the certificate is below the tolerance. In the column `false_claim` the
-# method returned something as its answer, but this does not obey the laws. Our twenty lines stop after 40 sortings that go
-# round in a circle, and return the last iterate. `auto` begins with the same idea. It notices when it makes no progress,
-# and changes to methods that can deal with a singular $Q$.
+# method returned forces as its answer, but these do not obey the laws. Our twenty lines give up after 40 sortings that go
+# round in a circle, and return the last forces. `auto` begins with the same idea. But it notices when it makes no progress,
+# and goes on with methods that can deal with a singular $Q$.
 #
 # A fair picture shows both speed and success. A *performance profile* shows, for every method, the share of the problems that
 # it solves within a factor of the best time. Its left end shows which method is the fastest, and its right end shows which

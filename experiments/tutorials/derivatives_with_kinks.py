@@ -3,9 +3,9 @@
 #
 # How does the contact force change if friction grows a little, or if the load does? Whoever fits a friction coefficient to
 # measurements, or shapes a punch so that its pressure is even, needs the answer to this question. The solution of a
-# contact problem is a function of its data, and this function has a derivative almost everywhere. This tutorial draws the
-# function for one contact node, computes its derivative by hand and by `contactopt.sensitivity`, looks at the places
-# where there is none, and shows why it is a bad idea to smooth them away.
+# contact problem is a function of its data, and this function has a derivative almost everywhere. In this tutorial we draw
+# this function for one contact node. We compute its derivative by hand and by `contactopt.sensitivity`. We look at the points
+# where it has no derivative, and see why it is a bad idea to smooth these points away.
 #
 # Reading time: 15 minutes. [Tutorial 1](one_contact_node.py) explains the letters, and solves the problem of the one node.
 
@@ -37,7 +37,7 @@ def solved(mu, load=q):
     return problem, solve(problem, tol=1e-12)
 
 
-fig, axes = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
+fig, axes = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 frictions = np.linspace(0.0, 1.3, 53)
 by_mu = np.array([solved(mu)[1].reactions[0] for mu in frictions])
 loads = np.linspace(-2.5, 2.5, 101)
@@ -50,7 +50,7 @@ for ax, x, forces, label in (
     ax.plot(x, forces[:, 1], "C0", label="$r_t$")
     ax.set(xlabel=label, ylabel="force [N]")
 axes[0].axvline(5 / 6, color="0.7", lw=0.8)
-axes[0].annotate("slips | sticks", (5 / 6, 0.2), ha="center")
+axes[0].annotate("slips | sticks", (5 / 6, -0.35), ha="center")
 for mu in (0.3, 0.6, 1.1):
     problem, solution = solved(mu)
     slope = sensitivity(problem, solution).forward(mu=1.0).reactions[0]
@@ -58,14 +58,14 @@ for mu in (0.3, 0.6, 1.1):
     for component in range(2):
         axes[0].plot(mu + step, solution.reactions[0, component] + step * slope[component], "k", lw=2.5)
 axes[0].plot([], [], "k", lw=2.5, label="slope from sensitivity")
-axes[0].legend(frameon=False)
-axes[1].legend(frameon=False)
+axes[0].legend(frameon=False, loc="center left", bbox_to_anchor=(0.0, 0.62))
+_ = axes[1].legend(frameon=False)
 
 # %% [markdown]
-# The curves consist of smooth pieces. On the left, the node slips for small $\mu$; at $\mu = 5/6$ it begins to stick, and
-# from there on friction has no say any more. On the right there are three pieces: slip to the left, stick, and slip to the
-# right. Inside a piece the solution is a smooth function, and at the ends of a piece it has a **kink**: two slopes, one for
-# each side.
+# The curves consist of smooth pieces. In the left figure the node slips as long as $\mu$ is small. At $\mu = 5/6$ it begins to
+# stick. From there on the friction coefficient has no influence any more. In the right figure there are three pieces: slip
+# to the left, stick, and slip to the right. Inside a piece the solution is a smooth function. At the ends of a piece it has a
+# **kink**: two slopes, one for each side.
 #
 # ## The derivative by hand
 #
@@ -74,15 +74,16 @@ axes[1].legend(frameon=False)
 # $$ Q_{nn} r_n - \mu\, Q_{nt} r_n + q_n = 0 \quad\Rightarrow\quad r_n = \frac{-q_n}{Q_{nn} - \mu\, Q_{nt}},
 # \qquad \frac{dr_n}{d\mu} = \frac{Q_{nt}\, r_n}{Q_{nn} - \mu\, Q_{nt}} . $$
 #
-# For many contacts nobody wants to do this by hand. But the recipe is the same: **keep what every contact does, and
-# differentiate the equations that are left.** Newton's method has these equations at hand. Its last step solved a linear
-# system with the matrix
-
-# %% [markdown]
-# $$ M = \begin{pmatrix} I - D + D\rho Q & D \rho V \\ V^\top & 0 \end{pmatrix} $$
+# For many contacts nobody wants to do this by hand. But the recipe is the same: **keep the state of every contact (open,
+# stick or slip), and differentiate the equations that hold in this state.** Newton's method has these equations at hand. Its
+# last step solved a linear system with the matrix
 #
-# in which $D$ says which contact is open ($D = 0$), sticks ($D = I$) or slips. The derivative along a direction is one
-# more solve with $M$. The gradient of one number by *all* data is one solve with $M^\top$: this is the adjoint.
+# $$ M = \begin{pmatrix} I - D + D\rho Q & D \rho V \\ V^\top & 0 \end{pmatrix} . $$
+#
+# Here $D$ says which contact is open ($D = 0$), sticks ($D = I$) or slips. The columns of $V$ are the motions of plates, which
+# the one node does not have, and $\rho$ is a positive number. The *forward* derivative says how all results change with one
+# parameter. It takes one more solve with $M$. The *adjoint* says how one result changes with all parameters. It takes one
+# solve with $M^\top$.
 
 # %%
 mu = 0.5
@@ -117,7 +118,7 @@ more, less = kink.forward(mu=1.0).reactions[0], kink.forward(mu=-1.0).reactions[
 print(f"for more friction dr = {more}, for less friction dr = {less}")
 
 assert not kink.differentiable and kink.weak[0].edge == "stick / slip"
-assert np.allclose(more, 0.0)  # it sticks: friction has no say
+assert np.allclose(more, 0.0)  # it sticks: the coefficient has no influence
 assert less[0] < -0.5 and less[1] > 0.5
 assert not np.allclose(more, -less)  # a derivative would be linear in the direction
 
@@ -125,17 +126,17 @@ assert not np.allclose(more, -less)  # a derivative would be linear in the direc
 # ## Bilevel programs, in words
 #
 # Suppose a sensor says that the node slips by 0.1 mm. Which $\mu$ is it? This is an optimisation problem (make the
-# difference between slip and sensor small) whose constraint is again an optimisation problem, or at least a complementarity
-# problem (the slip is that of a solution). The outer problem is the *leader*, who chooses $\mu$; the contact is the
-# *follower*, who answers by a solution.
+# difference between slip and sensor small). Its constraint is again an optimisation problem, or at least a complementarity
+# problem: the slip must be that of a solution. The outer problem is called the *leader*, which chooses $\mu$. The contact is
+# the *follower*, which answers with a solution. There are three ways to write this.
 #
 # - If the follower minimises something, as contact without friction does, the whole is a **bilevel program**.
-# - If the follower's conditions are written out as constraints of the leader, $u_n \ge 0$, $r_n \ge 0$, $u_n r_n = 0$
-#   and so on, the whole is a **mathematical program with equilibrium constraints**, an MPEC. It is awkward for solvers of
-#   nonlinear programs: where $u_n = r_n = 0$ the gradients of these constraints are not independent, and multipliers
-#   need not exist.
-# - A third way is the one we take: let a contact solver answer for the follower, with a certificate, and use the
-#   derivative of its answer. This is *implicit programming*. The leader sees a function with kinks.
+# - The conditions of the follower, $u_n \ge 0$, $r_n \ge 0$, $u_n r_n = 0$ and so on, can be written as constraints of the
+#   leader. Then the whole is a **mathematical program with equilibrium constraints**, an MPEC. It is awkward for solvers of
+#   nonlinear programs. At a point with $u_n = r_n = 0$ the gradients of these constraints are not independent, and
+#   multipliers need not exist.
+# - We take a third way. A contact solver answers for the follower, with a certificate, and we use the derivative of its
+#   answer. This is called *implicit programming*. The leader then minimises a function with kinks.
 #
 # Newton's method finds the $\mu$ of the sensor in a few steps, from the derivative of the solution:
 
@@ -151,9 +152,10 @@ print(f"mu = {mu:.9f}, slip = {slip:.9f} mm, certificate {solution.residual:.1e}
 assert np.isclose(slip, sensor, rtol=1e-9)
 
 # %% [markdown]
-# From a first guess $\mu > 5/6$ this does not work: the node sticks, the derivative of the slip is zero, and no step is
-# better than another. That is no fault of the method. *Data from a contact that sticks say nothing of friction*, but that
-# $\mu$ is large enough. `contactopt.fit` finds this out by the singular values of its Jacobian, and says so.
+# From a first guess $\mu > 5/6$ this does not work. The node sticks, the derivative of the slip is zero, and no step is
+# better than another. This is no fault of the method. *Data from a contact that sticks say nothing about the friction
+# coefficient*, except that it is large enough. `contactopt.fit` notices this by the singular values of its Jacobian (the
+# matrix of all derivatives), and says so.
 
 # %%
 problem, solution = solved(1.0)
@@ -200,10 +202,10 @@ assert np.all(slips > 0) and np.all(slopes < 0)
 assert min(certificates) > 1e-4  # no corner makes it a solution
 
 # %% [markdown]
-# Every rounded answer creeps, and says that more friction would help. A smaller $\varepsilon$ makes the error smaller and
-# Newton's method harder, for the round corner becomes a sharp one. The certificate tells the two apart: a solution of
-# Coulomb's law passes it, and a solution of a smooth law does not. What is kept with it is the knowledge of *which*
-# contacts are at a kink, and what happens on each side.
+# Every answer of the rounded problem creeps, and its derivative says that more friction would help. A smaller $\varepsilon$
+# makes these errors smaller. But it makes Newton's method harder, because the round corner becomes a sharp one. The
+# certificate tells the two laws apart: a solution of Coulomb's law passes it, and a solution of a smooth law does not. If we
+# keep the kinks, we also know *which* contacts are at a kink, and what happens on each side of it.
 #
 # ## The convex case: derivatives of cone programs
 #
@@ -240,9 +242,10 @@ assert np.allclose((solve(there, tol=1e-13).reactions[:, 0] - answer.reactions[:
 # ## Design: a punch with an even pressure
 #
 # A flat punch presses hardest at its corners. Which profile makes the pressure even? `contactopt.design` minimises the
-# largest pressure. In each step it solves a *linear* program, made of the derivatives of all pressures by all shapes, inside
-# a trust region, and it keeps a step only if the largest pressure of the *certified* solution has really become smaller.
-# The maximum is a kink as well, and as constraints of a linear program it does no harm.
+# largest pressure. In each step it solves a *linear* program, which uses the derivatives of all pressures with respect to all
+# shapes. The step may not leave a region in which these derivatives can be trusted. It is kept only if the largest pressure
+# of the *certified* solution has really become smaller. The largest of several pressures is a function with kinks as well.
+# In a linear program it becomes a set of constraints, and its kinks do no harm.
 
 # %%
 half, cells = 10.0, 40
@@ -272,13 +275,13 @@ assert all(visit.certificate < 1e-9 for visit in designed.visits)
 # %% [markdown]
 # ## Exercises
 #
-# **1.** The vertical load: at $q_n = 0$ and $q_t = 0.5$ mm the node just touches the floor. Which edge does `sensitivity`
-# name, and what are the two one-sided derivatives by $q_n$?
+# **1.** At $q_n = 0$ and $q_t = 0.5$ mm the node just touches the floor. Between which two states does `sensitivity` see it?
+# What are the two one-sided derivatives with respect to $q_n$?
 #
 # <details><summary>Solution</summary>
 #
-# It is the edge between open and closed. Lifted, the node has no force. Pressed, it slips to the right, and the formula by
-# hand holds with $q_n$ in place of its value.
+# The node is between open and closed. If it is lifted, it has no force. If it is pressed, it slips to the right, and the
+# formula that we found by hand holds.
 #
 # ```python
 # touching = InterfaceProblem(Q, [[0.0, 0.5]], 0.5)
@@ -291,8 +294,8 @@ assert all(visit.certificate < 1e-9 for visit in designed.visits)
 #
 # </details>
 #
-# **2.** At the apex, $q = (0, 0)$, the node neither presses nor slips. Show that the one-sided derivative by $q$ is
-# not linear: the derivative along the sum of two directions is not the sum of the derivatives.
+# **2.** At the apex of the cone, $q = (0, 0)$, the node neither presses nor slips. Show that the one-sided derivative with
+# respect to $q$ is not linear: the derivative along the sum of two directions is not the sum of the derivatives.
 #
 # <details><summary>Solution</summary>
 #
@@ -311,12 +314,13 @@ assert all(visit.certificate < 1e-9 for visit in designed.visits)
 #
 # </details>
 #
-# **3.** Fix two coefficients of the profile by a convex constraint: the profile must have the height zero at the rim, and the
-# largest pressure can only become larger.
+# **3.** Add a constraint to the design: the profile must have the height zero at the rim. Can the largest pressure become
+# smaller by this?
 #
 # <details><summary>Solution</summary>
 #
-# The coefficients of even powers add up to the height at the rim, so the constraint is that their sum is zero.
+# It cannot, because fewer profiles are allowed. The coefficients of the even powers add up to the height at the rim, so the
+# constraint is that their sum is zero.
 #
 # ```python
 # tied = contactopt.design(punch, shapes, constraints=lambda c: [cp.sum(c) == 0])

@@ -2,9 +2,9 @@
 # # 4. Four roads to one answer
 #
 # A solution of Coulomb's problem is not the minimum of an energy. So every method replaces this problem, again and again,
-# by another one that can be solved. In this tutorial four methods solve the same problem: the alternating iteration,
+# by another one that can be solved. In this tutorial we give the same problem to four methods: the alternating iteration,
 # Tresca's iteration, Newton's method and the convex relaxation. The first three arrive at the same answer on different
-# roads. The fourth arrives in one step, but at another place.
+# roads. The fourth needs one step only, but arrives at the answer to another problem.
 #
 # Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) has the programs for one node.
 
@@ -46,7 +46,7 @@ for method in ("alternating", "tresca"):
 #
 # | method | what it holds fixed | what it solves in each iteration |
 # |---|---|---|
-# | alternating | the friction forces, then the normal forces | two QPs (section 5.1 of the paper) |
+# | alternating | the friction forces, then the normal forces | two quadratic programs (QPs), one for the normal and one for the friction forces |
 # | Tresca | the friction bounds $g = \mu r_n$ | one QP in all forces |
 # | Newton | which nodes are open, stick or slip | one linear system |
 #
@@ -60,7 +60,7 @@ for method, style in (("alternating", "o-"), ("tresca", "s-"), ("newton", "D-"))
     ax.semilogy(range(1, len(residuals) + 1), residuals, style, mfc="none", label=method)
     answers[method] = exact
 ax.set(xlabel="iteration [-]", ylabel="certificate: natural-map residual [-]")
-ax.legend(frameon=False)
+_ = ax.legend(frameon=False)
 
 # %% [markdown]
 # The two fixed-point iterations go down a straight line, because every iteration multiplies the error by the same number.
@@ -102,7 +102,7 @@ normal = np.array([0.97, 1.03]) * r[node, 0]
 ax.plot(np.sign(r[node, 1]) * 0.2 * normal, normal, "k--", lw=1, label=r"edge of the cone, $|r_t| = \mu\, r_n$")
 ax.plot(r[node, 1], r[node, 0], "k*", ms=12, label="solution")
 ax.set(xlabel="friction force $r_t$ [N]", ylabel="normal force $r_n$ [N]")
-ax.legend(frameon=False)
+_ = ax.legend(frameon=False)
 
 # %% [markdown]
 # ## The fourth road
@@ -119,7 +119,7 @@ u = problem.displacements(r, answers["newton"].multipliers)
 u_relaxed = problem.displacements(relaxed.reactions, relaxed.multipliers)
 
 x = problem.coordinates[0]
-fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
+fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 for label, forces, style in (("Coulomb", r, "C0-"), ("associated", relaxed.reactions, "C1--")):
     left.plot(x, -forces[:, 1] / problem.areas, style, label=label)
 left.set(xlabel="x [mm]", ylabel="friction on the block, inwards [MPa]")
@@ -147,9 +147,10 @@ assert diagnose(problem).relaxation == "not tight"
 assert natural_map_residual(problem, r, answers["newton"].multipliers) < 1e-12
 
 # %% [markdown]
-# Which road should you take? Newton's method needs few steps, with one dense factorisation in each, and it may run in a
-# circle if $Q$ is singular. The fixed-point iterations use a good QP solver as it stands. The default, `solve(problem)`,
-# begins with Newton's method. Where that fails, it solves cone programs, and then runs a proximal loop.
+# Which road should you take? Newton's method needs few steps. Each step takes one factorisation of a dense matrix. It may run
+# in a circle if $Q$ is singular. The fixed-point iterations need nothing but a good QP solver. The default,
+# `solve(problem)`, begins with Newton's method. If that fails, it tries an interior-point method, then cone programs, and at
+# last the method `proximal`.
 #
 # ## Exercises
 #

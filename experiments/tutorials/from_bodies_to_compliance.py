@@ -24,7 +24,8 @@ from contactopt.scenes.meshes import graded, rename, tensor_mesh
 # $$ Q = s_1^{-1} + s_2^{-1} . $$
 #
 # The same happens with two elastic bodies, where matrices take the place of the springs: $Q = S_1^{-1} + S_2^{-1}$. The
-# forces on the two sides of the interface are $r$ and $-r$. (This is the operator of the paper's equation 14.)
+# forces on the two sides of the interface are $r$ and $-r$. (In the paper by A. Lotfi, *Domain-Decomposition based H^1/2
+# Seminorm Preconditioners for Frictional Contact Problems*, this is equation 14.)
 #
 # ## Two blocks
 #
@@ -104,8 +105,9 @@ for S in (S1, S2):
 # %% [markdown]
 # ## Add the compliances
 #
-# The project counts one block per contact, *normal first*. The normal $n$ points out of the lower body: here upwards,
-# $n = (0, 1)$. The tangent is $t = (1, 0)$. So each block $(x, y)$ is read backwards: $(y, x)$.
+# contactopt orders the components by contacts, and within a contact the *normal comes first*: $(n, t)$. The normal $n$ points
+# out of the lower body, which is upwards here, $n = (0, 1)$. The tangent is $t = (1, 0)$. So the components $(x, y)$ of each
+# node have to be taken in the order $(y, x)$.
 #
 # The force on the upper body is $+r$, and that on the lower body is $-r$. The relative displacement is that of the upper body
 # minus that of the lower one. The two minus signs cancel, and the compliances add up, as those of the springs did.
@@ -120,14 +122,15 @@ assert np.allclose(Q, problem.Q, rtol=1e-8, atol=1e-12)
 assert np.all(np.diff(problem.coordinates[0]) > 0)
 
 # %% [markdown]
-# This is, to eight digits, the $Q$ of `contactopt.reduce`, which does the same with sparse factors. From here on nobody needs
-# to know that there are finite elements: all that a solver sees is $u = Q r + q$.
+# To eight digits this is the matrix $Q$ that `contactopt.reduce` computes with sparse matrices. From here on nobody needs to
+# know that there are finite elements. All that a solver sees is $u = Q r + q$, where $q$ is the displacement without contact
+# forces.
 #
 # ## What Q looks like
 #
 # Take the normal block $Q_{nn}$. Each of its columns is the dent that a unit force at one node makes. The dent is deepest
-# where the force acts, and twice as deep if the force acts at an edge. It falls off slowly, so every node feels all
-# others.
+# where the force acts. It is about twice as deep if the force acts at an edge. Away from the force the dent falls off slowly,
+# so that every node feels all others.
 
 # %%
 Q_nn = Q[::2, ::2]
@@ -135,15 +138,15 @@ values, vectors = np.linalg.eigh(Q_nn)
 values, vectors = values[::-1], vectors[:, ::-1]  # softest first
 x = problem.coordinates[0]
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.8), layout="constrained")
 for column in (0, 16, 24):
     left.plot(x, Q_nn[:, column], label=f"force at x = {x[column]:g} mm")
 left.set(xlabel="x [mm]", ylabel="normal displacement [mm/N]")
-left.legend(frameon=False)
+left.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 for j in (0, 1, 2, 5):
-    right.plot(x, vectors[:, j] * np.sign(vectors[-1, j]), label=f"eigenvector {j}")
-right.set(xlabel="x [mm]", ylabel="eigenvector, unit length [-]", ylim=(-0.4, 0.52))
-right.legend(frameon=False, ncols=2)
+    right.plot(x, vectors[:, j] * np.sign(vectors[-1, j]), label=f"number {j}")
+right.set(xlabel="x [mm]", ylabel="eigenvector, unit length [-]")
+right.legend(frameon=False, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 assert np.array_equal(np.argmax(Q_nn, axis=0), np.arange(nodes))
 assert Q_nn[0, 0] > 1.8 * Q_nn[16, 16]
@@ -187,7 +190,7 @@ for count, marker in ((17, "s"), (33, "o"), (65, "^")):
     assert np.all(np.abs(eigenvalues[2 : count // 4] / predicted(count)[1 : count // 4 - 1] - 1) < 0.25)
 ax.loglog(np.arange(1, 65), predicted(65) * 4 / 64, "k--", lw=1, label=r"half-planes, $2 / (E^* \xi_j)$")
 ax.set(xlabel="number j of the wave [-]", ylabel=r"eigenvalue of $Q_{nn}$ times h [mm$^2$/N]")
-ax.legend(frameon=False)
+_ = ax.legend(frameon=False)
 
 # %% [markdown]
 # On every mesh we see a straight line of slope $-1$. It bends only where the waves are too short for the mesh. Each
@@ -208,7 +211,7 @@ assert np.all((growth > 1.9) & (growth < 2.1))
 # The condition number of the whole $Q$ is about ten times that of its normal block, but it grows at the same rate. The
 # reason is one more soft motion: the punch, which is held at its top, can sway sideways.
 #
-# [Tutorial 3](why_the_preconditioner_works.py) undoes the division by $|\xi|$.
+# [Tutorial 3](why_the_preconditioner_works.py) shows how an iterative method can undo the division by $|\xi|$.
 #
 # ## Exercises
 #
@@ -252,8 +255,8 @@ assert np.all((growth > 1.9) & (growth < 2.1))
 #
 # </details>
 #
-# **3.** The Schur complement is dense. How many numbers does $Q$ hold for a 3D interface of 100 x 100 nodes? For which
-# operations would you rather not form it?
+# **3.** The Schur complement is dense. How many numbers does $Q$ hold for a 3D interface of 100 x 100 nodes? How can a product
+# $Q r$ be computed without forming $Q$?
 #
 # <details><summary>Solution</summary>
 #

@@ -1,10 +1,10 @@
 # %% [markdown]
-# # 9. Half-space or finite elements?
+# # 10. Half-space or finite elements?
 #
-# A body that is large beside its contact looks like a half-space from there: everything above (or below) a plane is elastic.
-# A half-space needs no mesh, because Boussinesq knew in 1885 how its surface moves under a force. In this tutorial we solve
-# the same contact, a rigid sphere on a block, with finite elements and with a half-space. We look at what each costs for a
-# given accuracy. Then we make the block small, and see when the half-space is wrong.
+# Seen from its contact, a large body looks like a half-space: everything below (or above) a plane is elastic. A half-space
+# needs no mesh, because it is known since Boussinesq (1885) how its surface moves under a force. In this tutorial we solve the
+# same contact, a rigid sphere on a block, with finite elements and with a half-space. We compare what each costs for a given
+# accuracy. Then we make the block small, and see when the half-space is the wrong model.
 #
 # Reading time: 10 minutes. [From bodies to compliance](from_bodies_to_compliance.py) explains $Q$ for finite elements.
 
@@ -29,8 +29,9 @@ print(
 #
 # We put points on a square of the surface, evenly spaced by $h$. Each point stands for a cell of $h \times h$ that carries a
 # uniform traction. A unit of force on one cell moves the middle of another cell by the integral of $1/\rho$ over the loaded
-# cell, which Love wrote down in closed form in 1929. It depends on the distance of the cells alone. So $Q$ is a convolution,
-# and a product $Qr$ costs a few fast Fourier transforms, whatever the shape of the contact.
+# cell, up to a constant factor. ($\rho$ is the distance.) Love wrote this integral down in closed form in 1929. It depends on
+# the distance of the two cells alone. So $Q$ is a convolution, and a product $Qr$ costs a few fast Fourier transforms,
+# whatever the shape of the contact.
 
 # %%
 a = exact.half_width
@@ -69,9 +70,9 @@ print(f"{problem.contacts} contacts, {seconds:.1f} s, {solution.products} produc
 # %% [markdown]
 # ## The same with finite elements
 #
-# The best finite elements can do is to use the symmetry about the axis: the scene `sphere` with a rigid sphere is a block of
-# radius and height 800 mm, 45 times the contact radius. We compare errors of the pressure, in the mean square over the
-# contact, with the time that each needs.
+# Finite elements can use the symmetry about the axis, which saves most of the work. The scene `sphere` with a rigid sphere is a
+# block with a radius and a height of 800 mm, which is 45 times the contact radius. We draw the error of the pressure, in the
+# mean square over the contact, against the time that each model needs.
 
 
 # %%
@@ -98,15 +99,16 @@ assert spaced[-1, 0] < 0.01
 assert spaced[-1, 0] < spaced[0, 0] / 3
 
 # %% [markdown]
-# The half-space is three-dimensional and knows nothing of the axis, yet it costs no more. Finite elements in three dimensions
-# would need about a hundred times the unknowns of the section. That is the rule: *model no more than a scene needs*. Where the
-# bodies are large beside the contact, the volume is not needed.
+# The half-space is three-dimensional and does not use the symmetry, yet it costs no more. Finite elements in three dimensions
+# would need about a hundred times the unknowns of the section. The rule is: *model no more than a scene needs*. If the bodies
+# are large beside the contact, we need no mesh of their volume.
 #
 # ## When the half-space is wrong
 #
-# Two assumptions stand behind it. The slopes are small: $a \ll R$. And the body is large beside the contact: its thickness $H$ is
-# many times $a$. Let us break the second one. The block below gets thinner, from 40 to 2 contact radii, and is glued to a
-# rigid floor. The half-space stays what it is.
+# The half-space rests on two assumptions. The slopes of the surfaces are small, so the contact radius $a$ is much smaller than
+# the radius $R$ of the sphere. And the body is large beside the contact, so its thickness $H$ is many times $a$. Let us break
+# the second assumption. We make the block thinner, from 40 to 2 contact radii, and glue it to a rigid floor. The half-space
+# stays what it is.
 
 # %%
 thickness = np.array([2.0, 4.0, 8.0, 16.0, 40.0])
@@ -125,6 +127,8 @@ fig, ax = plt.subplots(figsize=(5.5, 3.8), layout="constrained")
 ax.semilogx(thickness, approach, "o-", color="C1", label="approach")
 ax.semilogx(thickness, peak, "s-", color="C2", label="peak pressure")
 ax.axhline(1.0, color="C0", label="half-space")
+ax.set_xticks(thickness, [f"{value:g}" for value in thickness])
+ax.minorticks_off()
 ax.set(xlabel="thickness of the block over contact radius, H / a", ylabel="finite elements over half-space")
 ax.legend(frameon=False)
 assert approach[0] < 0.8  # a thin block gives way less
@@ -134,9 +138,10 @@ assert np.all(np.abs(peak[1:] - 1) < 0.01)
 assert abs(approach[-1] - 1) < 0.05
 
 # %% [markdown]
-# The pressure forgets the size of the block soon, because it is made near the contact. The approach remembers it longer: far away
-# from the contact the displacement falls like $1/\rho$ only, so that a block of eight radii still misses more than 5 % of it. If you
-# want pressures, a half-space is good from a few contact radii on. If you want stiffness, the body must be tens of radii large.
+# The pressure depends on the material near the contact. So it is nearly right as soon as the block is a few contact radii
+# thick. The approach needs a much larger block, because far away from the contact the displacement falls only like $1/\rho$. A
+# block of eight contact radii still approaches over 5 % less than the half-space. If you want pressures, a half-space is
+# good for bodies of a few contact radii and more. If you want the stiffness, the body must be tens of radii large.
 #
 # ## Exercises
 #
@@ -150,8 +155,9 @@ assert abs(approach[-1] - 1) < 0.05
 # assert max(counts) < 1.6 * min(counts)
 # ```
 #
-# Coarse grids find out which points are in contact, and the preconditioner is the inverse of the same convolution. A product costs
-# $O(n^2 \log n)$ for $n^2$ points.
+# Coarse grids find out which points are in contact, and only a few steps remain on the finest grid. The preconditioner is the
+# inverse of the same convolution, so that each step takes few products. One product costs $O(n^2 \log n)$ operations for $n^2$
+# points.
 #
 # </details>
 #
@@ -172,7 +178,7 @@ assert abs(approach[-1] - 1) < 0.05
 # assert abs(depths[below.argmax()] / a - 0.48) < 0.03
 # ```
 #
-# It yields below the surface, at about half a contact radius, where nobody sees it.
+# It begins to yield below the surface, at a depth of about half a contact radius, where nobody sees it.
 #
 # </details>
 

@@ -2,8 +2,9 @@
 # # 5. When friction has no solution, two or three
 #
 # A problem of elasticity has one solution, and so has contact without friction. With friction this need not be so. This
-# tutorial shows problems of a single contact that have three solutions, exactly two, and none at all. It shows a method
-# that runs in circles although there is exactly one solution, and the tools that tell all this beforehand.
+# tutorial shows problems with a single contact that have three solutions, exactly two, and none at all. It also shows a
+# method that runs in circles although there is exactly one solution. And it shows the tools that tell you all this before
+# you solve.
 #
 # Reading time: 10 minutes. [Tutorial 1](one_contact_node.py) explains the letters.
 
@@ -22,7 +23,7 @@ from contactopt import InterfaceProblem, Status, all_solutions, diagnose, models
 # and *presses* it down on the floor. The compliance is $Q = K^{-1}$, and without the floor the node would go to
 # $q = Q\,(-\text{press},\ \text{push})$.
 
-# %%
+# %% tags=["hide-input"]
 fig, ax = plt.subplots(figsize=(5, 3), layout="constrained")
 ax.axhspan(-0.5, 0, color="0.8", lw=0)
 ax.plot([-2.2, 2.4], [0, 0], "k", lw=1)
@@ -42,7 +43,7 @@ for tail, head, name, color, at in (
     ax.annotate("", head, tail, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8})
     ax.text(*at, name, color=color, fontsize=12)
 ax.set(xlim=(-2.2, 2.4), ylim=(-0.5, 2.2), aspect="equal")
-ax.axis("off")
+_ = ax.axis("off")
 
 # %%
 K = np.array([[4.0, -1.5], [-1.5, 1.0]])  # N / mm; normal component first
@@ -61,8 +62,8 @@ assert problem.Q[0, 1] > 0  # a push to the right also lifts the node: that is w
 # %% [markdown]
 # ## Three answers
 #
-# `all_solutions` sorts every contact into open, stick, slip to the left or to the right, by a mixed-integer program,
-# until no combination is left. We push with 0.8 N, press with 1 N, and take $\mu = 1$:
+# A contact can be open, stick, slip to the left, or slip to the right. `all_solutions` tries these states by a mixed-integer
+# program, until no combination is left. We push with 0.8 N, press with 1 N, and take $\mu = 1$:
 
 # %%
 solutions = sorted(all_solutions(problem), key=lambda s: s.reactions[0, 0])
@@ -74,12 +75,12 @@ assert np.allclose([s.reactions[0] for s in solutions], [[0.0, 0.0], [0.4, -0.4]
 assert all(s.residual < 1e-12 for s in solutions)
 
 # %% [markdown]
-# In the first solution the node is *open*: it moves to the right, and because of the coupling it lifts off. In the third
-# it *sticks*: friction holds it back, therefore it does not lift off, therefore it is pressed on the floor, and therefore
-# there is friction. The second solution, *slip*, lies in between. All three obey every law exactly. Which one happens in
-# reality depends on the history, and the data say nothing about that.
+# In the first solution the node is *open*. It moves to the right, and because of the coupling it lifts off. In the third
+# solution it *sticks*. Friction holds it back. Therefore it does not lift off, it is pressed on the floor, and there is
+# friction. In the second solution it *slips*, which lies between the two. All three obey every law exactly. Which one
+# happens in reality depends on what happened before, and the data say nothing about that.
 #
-# A method finds the solution that it starts near:
+# If a method starts near one of the solutions, it finds this one:
 
 # %%
 for s in solutions:
@@ -112,9 +113,9 @@ assert count == {0.6: 1, 0.7: 1, 0.8: 2, 0.9: 3}
 
 # %% [markdown]
 # At $\mu = 0.8$ there are *exactly two* solutions: in one of them the node is open, and in the other it sticks with all the
-# friction that there is. Here the pair of stick and slip is born. Such a border case is an exception. Generically, that is
-# for all data but exceptional ones, the number of solutions is *odd* as long as $Q$ is positive definite: solutions appear
-# and disappear in pairs. Loads drawn at random show it.
+# friction that there is. For a larger $\mu$ this solution splits into two, one with stick and one with slip. Such a border
+# case is an exception. For all data but exceptional ones the number of solutions is *odd*, as long as $Q$ is positive
+# definite, because solutions appear and disappear in pairs. Loads drawn at random show this.
 
 # %%
 random = np.random.default_rng(0)
@@ -124,8 +125,8 @@ print("solutions for 200 random loads:", {n: numbers.count(n) for n in sorted(se
 assert set(numbers) == {1, 3}
 
 # %% [markdown]
-# For other loads the pair is born at another $\mu$. Below which $\mu$ is there one solution *whatever the load*? For one
-# contact the answer is known exactly, $\mu^* = K_{tt} / |K_{tn}| = 2/3$, and `diagnose` finds it without the load.
+# For other loads the pair appears at another $\mu$. Below which $\mu$ is there one solution *whatever the load*? For one
+# contact the answer is known exactly: $\mu^* = K_{tt} / |K_{tn}| = 2/3$. `diagnose` finds it without knowing the load.
 
 # %%
 print(diagnose(problem))
@@ -141,7 +142,7 @@ for mu in (0.6, 0.7, 1.0):
     ax.step(angles, number, where="mid", label=rf"$\mu$ = {mu}")
     assert max(number) == (1 if mu < 2 / 3 else 3)
 ax.set(xlabel="direction of the load [degrees from horizontal]", ylabel="number of solutions [-]", yticks=[1, 2, 3])
-ax.legend(frameon=False)
+_ = ax.legend(frameon=False)
 
 # %% [markdown]
 # Just above the threshold only loads in a narrow sector have three solutions. With more friction the sector becomes wider.
@@ -165,12 +166,12 @@ assert np.allclose(only.reactions, [[6.4, 6.4]])
 assert stuck_in_a_loop.status is Status.CYCLING
 
 # %% [markdown]
-# A drawing shows why. For a given friction bound $g$ one QP yields the normal force $r_n(g)$, and the next bound is
+# A drawing shows why. For a given friction bound $g$ one quadratic program yields the normal force $r_n(g)$, and the next bound is
 # $\mu\, r_n(g)$. A solution is a point where this curve meets the diagonal. The iteration goes vertically to the curve, then
 # horizontally to the diagonal, and so on. If the curve falls by more than one per unit, the path spirals outwards.
 
 # %%
-fig, axes = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained", sharey=True)
+fig, axes = plt.subplots(1, 2, figsize=(6.4, 3.6), layout="constrained", sharey=True)
 bounds = np.linspace(0, 16, 33)
 for ax, mu in zip(axes, (0.6, 1.0)):
     program = models.tresca(node(-10.0, 1.0, mu))
@@ -198,10 +199,10 @@ assert np.isclose(max(y for _, y in path), 14.5, atol=0.1)  # the cycle runs bet
 
 # %% [markdown]
 # At this solution the node slips to the left, and the slope of the curve is $-\mu / \mu^*$. So the same number 2/3 decides:
-# below it the iteration contracts, and above it the iteration runs in circles. But mind the sign. A slope of $-1$ is the end
-# of the *iteration*. A slope of $+1$ is the end of *uniqueness*, and needs a node that slips to the right. Here the slope is
-# negative, so the solution is unique, and the fault is the method's. There are two remedies: to take half steps, or to take
-# another method.
+# below it the iteration converges, and above it the iteration runs in circles. But mind the sign. At a slope of $-1$ the
+# *iteration* stops converging. At a slope of $+1$ the solution stops being *unique*, and this needs a node that slips to the
+# right. Here the slope is negative, so the solution is unique, and only the method fails. There are two remedies: half
+# steps, or another method.
 
 # %%
 half_steps = solve(pulled, "tresca", relaxation=0.5)
@@ -240,9 +241,9 @@ print(f"mu = 2: {jammed.status}, certificate {jammed.residual:.2f}")
 assert not jammed.solved and jammed.residual > 0.1
 
 # %% [markdown]
-# No method finds a solution that does not exist, and the certificate shows it. The model is at fault, because nothing is
-# perfectly rigid. Let the guide give way a little, by $\varepsilon$. Now $Q$ is positive definite, and a solution exists. For
-# $\mu = 2$ the piston sticks in it, wedged in with a force of about $1 / (2 \varepsilon)$.
+# No method finds a solution that does not exist, and the certificate shows this. The model is at fault, because nothing is
+# perfectly rigid. Let the guide give way a little, with the compliance $\varepsilon$. Now $Q$ is positive definite, and a
+# solution exists. For $\mu = 2$ the piston sticks: it is wedged in the guide with a force of about $1 / (2 \varepsilon)$.
 
 # %%
 gives = np.logspace(-4, 0, 17)
@@ -250,7 +251,7 @@ fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
 for mu in (0.5, 0.9, 2.0):
     force = [solve(piston(mu, give)).reactions[0, 0] for give in gives]
     ax.loglog(gives, force, "o-", ms=3, label=rf"$\mu$ = {mu}")
-ax.set(xlabel=r"give of the guide $\varepsilon$ [mm/N]", ylabel="normal force [N]")
+ax.set(xlabel=r"compliance of the guide $\varepsilon$ [mm/N]", ylabel="normal force [N]")
 ax.legend(frameon=False)
 
 assert np.isclose(force[0], 1 / (2 * gives[0]), rtol=0.01)

@@ -3,8 +3,8 @@
 #
 # One node of an elastic body comes down on a floor. Will it touch the floor? Will it slide? How large are the forces?
 # This tutorial answers these questions three times, each time with another kind of mathematical program: a quadratic
-# program (QP), a second-order cone program (SOCP), and a complementarity problem. Each program is written in `cvxpy`,
-# in about five lines.
+# program (QP), a second-order cone program (SOCP), and a linear complementarity problem (LCP). The text explains each of
+# them where it appears. Each program is written in `cvxpy`, a Python package for convex optimisation, in about five lines.
 #
 # Reading time: 10 minutes. You need linear algebra, and you should have seen a Lagrange multiplier before.
 
@@ -29,7 +29,7 @@ from contactopt import InterfaceProblem, all_solutions, natural_map_residual, so
 # - $u = (u_n, u_t)$ is the position of the node relative to the floor. $u_n \ge 0$ is the gap that remains, and $u_t$
 #   is the slip: how far the node has moved along the floor.
 
-# %%
+# %% tags=["hide-input"]
 fig, ax = plt.subplots(figsize=(5, 3.4), layout="constrained")
 ax.axhspan(-0.5, 0, color="0.8", lw=0)
 ax.plot([-2, 2.6], [0, 0], "k", lw=1)
@@ -48,7 +48,7 @@ for tail, head, name, color, at in (
 ax.text(-1.1, 1.75, "elastic body", color="C0")
 ax.text(-1.9, -0.32, "floor", color="0.3")
 ax.set(xlim=(-2, 2.6), ylim=(-0.5, 2.4), aspect="equal")
-ax.axis("off")
+_ = ax.axis("off")
 
 # %% [markdown]
 # The arrows show the positive directions. The body is linear, so the displacement depends on the force by a small
@@ -74,8 +74,9 @@ assert np.all(np.linalg.eigvalsh(Q) > 0)  # every force stores energy in the bod
 #
 # $$ u_n \ge 0, \qquad r_n \ge 0, \qquad u_n\, r_n = 0 . $$
 #
-# The node does not penetrate the floor, the floor does not pull on the node, and there is a force only where the gap is
-# closed. These rules are the optimality conditions of the quadratic program
+# The node does not penetrate the floor, the floor does not pull on the node, and there is a force only if the gap is
+# closed. These rules are the optimality conditions of a *quadratic program* (QP), in which a quadratic cost is minimised
+# under linear constraints:
 #
 # $$ \min_{r_n \ge 0} \; \tfrac12 Q_{nn} r_n^2 + q_n r_n . $$
 #
@@ -117,7 +118,7 @@ assert np.isclose(push.dual_value, 2.0, atol=1e-5)
 #
 # The derivative of this cost is the slip $u_t$. If the minimum lies inside the interval, the derivative vanishes and the
 # node *sticks*. If the minimum lies at an end of the interval, the node *slips*, and the force at that end is opposite to
-# the slip. The *alternating iteration* solves the two QPs in turn, each with the other's last answer.
+# the slip. The *alternating iteration* solves the two QPs in turn. Each of them uses the last answer of the other.
 
 # %%
 force = cp.Variable(2)
@@ -151,7 +152,7 @@ assert np.allclose(error[1:] / error[:-1], mu * Q[0, 1] / Q[0, 0], rtol=1e-2)
 # $\mu = 0.84$ on the node sticks. Then the friction force no longer depends on $\mu$, and the factor is
 # $Q_{nt}^2 / (Q_{nn} Q_{tt}) = 0.13$, which is below one for every positive definite $Q$.
 #
-# The iteration can fail where the node keeps slipping. Pull it hard to the *left*, with $q = (-1, -5)$. Now
+# The iteration can fail if the node keeps slipping. Pull it hard to the *left*, with $q = (-1, -5)$ mm. Now
 # $r_t = +\mu r_n$, and the slope is negative, $-\mu\, Q_{nt} / Q_{nn}$: the error changes its sign in every iteration. At
 # $\mu = 2.6$ the slope is $-1.04$, and the iteration jumps to and fro for ever, although the problem has exactly one
 # solution.
@@ -171,16 +172,17 @@ for much in (0.5, 2.4, 2.6):
     assert answer.solved == (much < 2.5)
 
 # %% [markdown]
-# Two things must be told apart. A slope of $-1$ is the end of this *iteration*, but the solution stays unique, and other
-# methods find it. A slope of $+1$ is the end of *uniqueness*: there are loads with several solutions, whatever the method.
+# Two things must be told apart. At a slope of $-1$ this *iteration* stops converging. But the solution stays unique, and
+# other methods find it. At a slope of $+1$ the solution stops being *unique*: there are loads with several solutions,
+# whatever the method.
 # [Tutorial 5](no_one_or_three_solutions.py) shows both.
 
 # %% [markdown]
 # ## Both at once: an SOCP
 #
 # The forces that Coulomb's law admits form a cone, $K = \{\,|r_t| \le \mu\, r_n\}$. In 3D the tangential force has two
-# components, the cone is round, and the constraint is called a second-order cone. We write it in a form that would work in
-# 3D too, and minimise the energy over the cone:
+# components, and the cone is round. Such a constraint is called a second-order cone, and a program with it is a
+# *second-order cone program* (SOCP). We write it in a form that would work in 3D too, and minimise the energy over the cone:
 
 # %%
 r = cp.Variable(2)
@@ -217,17 +219,20 @@ assert np.isclose(u[0], 0.0, atol=1e-5)
 # %% [markdown]
 # ## No iteration at all: a complementarity problem
 #
-# In 2D the friction law has finitely many cases. It can be written as pairs of numbers that are not negative, and of
-# which at least one is zero:
+# In 2D the friction law has finitely many cases. It can be written as three pairs of numbers. None of these numbers is
+# negative, and in every pair at least one is zero. Such a problem is called a *linear complementarity problem* (LCP). We
+# need two new numbers. $x = r_t + \mu r_n$ says how far the friction force is from pulling to the left with all its
+# strength. $y$ is the slip to the left, or zero if the node does not slip to the left.
 #
-# | $z \ge 0$ | complementary to | says |
-# |---|---|---|
-# | $r_n$ | $u_n$ | Signorini |
-# | $x = r_t + \mu r_n$ | $u_t + y$ | the node slips to the right only if friction pulls left with all its force |
-# | $y$ | $2\mu r_n - x = \mu r_n - r_t$ | it slips to the left, $u_t = -y$, only if friction pulls right with all its force |
+# | the pair | what it says |
+# |---|---|
+# | $r_n$ and $u_n$ | Signorini's conditions |
+# | $x$ and $u_t + y$ | the node slips to the right ($u_t > 0$, $y = 0$) only if $x = 0$: friction pulls to the left with all its strength |
+# | $y$ and $2\mu r_n - x = \mu r_n - r_t$ | the node slips to the left ($u_t = -y$) only if $r_t = \mu r_n$: friction pulls to the right with all its strength |
 #
-# Which number of a pair is zero is a question with two answers. One binary variable $b$ for each pair asks it, with the
-# help of a number $M$ that is larger than anything in the answer. A mixed-integer solver finds the answer.
+# For each pair we have to decide which of the two numbers is zero. A binary variable $b$, which is 0 or 1, makes this
+# decision. The constraints below need a number $M$ that is larger than any number in the answer. A mixed-integer solver
+# tries the decisions until everything fits.
 
 # %%
 z, b, M = cp.Variable(3, nonneg=True), cp.Variable(3, boolean=True), 10.0
@@ -239,8 +244,9 @@ complementarity.solve(solver=cp.SCIPY)
 assert np.allclose(reaction.value, [1.25, -0.625], atol=1e-6)
 
 # %% [markdown]
-# Three programs have given one answer. `contactopt` gives it too, and also says how good it is. The *certificate* is the
-# natural-map residual. It is zero exactly at the solutions of Coulomb's problem, and it is computed from the problem alone.
+# Three programs have given one answer. `contactopt` gives it too, and also says how good it is. The *certificate*, also
+# called the natural-map residual, is computed from the problem and the forces alone. It is zero exactly at the solutions of
+# Coulomb's problem.
 
 # %%
 problem = InterfaceProblem(Q, [q], mu)  # one row of q per contact
@@ -265,7 +271,7 @@ answers = [solve(InterfaceProblem(Q, [q], value)) for value in coefficients]
 forces = np.array([answer.reactions[0] for answer in answers])
 slips = (forces @ Q + q)[:, 1]
 
-fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+fig, (left, right) = plt.subplots(1, 2, figsize=(6.4, 3.2), layout="constrained")
 left.plot(coefficients, forces[:, 0], label="normal force $r_n$")
 left.plot(coefficients, -forces[:, 1], label="friction force $-r_t$")
 left.set(xlabel=r"friction coefficient $\mu$ [-]", ylabel="force [N]", ylim=(0, 1.7))
@@ -280,8 +286,8 @@ assert all(answer.solved for answer in answers)
 assert np.all((slips > 1e-6) == (coefficients < 1.25 / 1.5))
 
 # %% [markdown]
-# Here is the same with a slider. Every position of the slider shows an answer that was computed and certified above; the
-# page only draws it. (The cell makes a few lines of HTML, so the slider also works in a saved page, without Python.)
+# Here is the same with a slider. Every position of the slider shows an answer that was computed and certified above. The
+# page only draws it. (The folded cell writes a few lines of HTML. So the slider also works in a saved page, without Python.)
 
 # %% tags=["hide-input"]
 PAGE = """
@@ -340,13 +346,13 @@ Slider(rows, start=25)
 # %% [markdown]
 # ## Exercises
 #
-# **1.** Press harder: $q = (-2, 0.9)$. From which $\mu$ on does the node stick? Guess first whether it needs more or less
-# friction than before.
+# **1.** Press harder: $q = (-2, 0.9)$ mm. What is the smallest $\mu$ with which the node sticks? Guess first whether it needs
+# more friction than before, or less.
 #
 # <details><summary>Solution</summary>
 #
-# The sticking force is $-Q^{-1}q$; the node sticks once the cone holds it. Pressing harder makes friction stronger, so
-# a smaller coefficient is enough.
+# The sticking force is $-Q^{-1}q$. The node sticks if the cone contains this force. If we press harder, the bound on the
+# friction force is larger, so that a smaller coefficient is enough.
 #
 # ```python
 # r_n, r_t = -np.linalg.solve(Q, [-2.0, 0.9])
@@ -360,14 +366,14 @@ Slider(rows, start=25)
 #
 # </details>
 #
-# **2.** Add a second tangential direction. The block of the node is now $(n, t_1, t_2)$. Which of the three programs
-# still works as it stands, which needs a change, and which cannot be written at all?
+# **2.** Add a second tangential direction. The components of the node are now $(n, t_1, t_2)$. Which of the three programs
+# still works as it stands? Which one needs a change? Which one cannot be written at all?
 #
 # <details><summary>Solution</summary>
 #
 # The SOCP works as it stands: `r[1:]` has two components. The tangential QP becomes a small SOCP, over a disc instead
-# of an interval. The complementarity problem counts the cases of a law with two directions; the circle has infinitely
-# many, so it needs a polygon in its place, which is another law.
+# of an interval. The complementarity problem lists the cases of a law with two directions. The circle has infinitely many
+# directions. A polygon would have to take its place, and that is another law.
 #
 # ```python
 # Q3 = np.block([[Q, np.zeros((2, 1))], [np.zeros((1, 2)), np.array([[1.2]])]])

@@ -98,9 +98,9 @@ print(diagnose(problem))
 assert np.linalg.matrix_rank(problem.Q) == 6
 
 # %% [markdown]
-# The matrix has rank 6 only, and 12 rows: a rigid cube can move in six ways, but four corners have twelve components. It is
-# like a table on four legs, where nobody can say how much each leg carries. So the impulses are *not unique*, whatever the
-# friction is. Solvers that need a positive definite matrix may fail here.
+# The matrix has 12 rows, but its rank is only 6. A rigid cube can move in six ways, but its four corners have twelve
+# components. It is like a table on four legs, where nobody can say how much each leg carries. So the impulses are *not
+# unique*, whatever the friction is. Solvers that need a positive definite matrix may fail here.
 #
 # ## Solve
 
@@ -124,7 +124,8 @@ fig, ax = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
 for i, (method, answer) in enumerate(answers.items()):
     ax.bar(np.arange(4) + 0.2 * i - 0.3, answer.reactions[:, 0], width=0.2, label=method)
 ax.set_xticks(range(4), ["rear right", "rear left", "front right", "front left"])
-ax.set(xlabel="corner", ylabel="normal impulse [N s]", ylim=(0, 0.22))
+most = max(answer.reactions[:, 0].max() for answer in answers.values())
+ax.set(xlabel="corner", ylabel="normal impulse [N s]", ylim=(0, 1.4 * most))
 ax.legend(frameon=False, ncols=2, loc="upper left")
 
 spread = np.ptp([answer.reactions[:, 0] for answer in answers.values()], axis=0)
@@ -156,9 +157,9 @@ assert published < 0.1 * first[1]
 # %% [markdown]
 # ## Write one back
 #
-# Elastic problems fit into the local form, $u = W r + V \lambda + q$. A block that a plate presses down brings a balance of
-# forces with it, which FCLib calls the equality part of its mixed form. All numbers are kept to the last bit. Coordinates
-# and nodal areas are not part of the format and are lost.
+# Elastic problems fit into the local form of FCLib, $u = W r + V \lambda + q$. If a plate presses a block down, the contact
+# forces must balance the load of the plate. FCLib calls this the equality part of its mixed form. All numbers are kept to the
+# last bit. Coordinates and nodal areas are not part of the format, so they are lost.
 
 # %%
 block = reduce(scenes.flat_punch(3, elements=2, mu=0.2))

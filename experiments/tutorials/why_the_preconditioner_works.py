@@ -2,9 +2,10 @@
 # # 3. The circulant preconditioner and why it works
 #
 # [Tutorial 2](from_bodies_to_compliance.py) found what the compliance $Q$ does to a wave of force: it makes a wave of
-# displacement out of it, divided by the wave number $|\xi|$. So whoever multiplies a displacement by $|\xi|$ nearly
-# undoes $Q$, and Fourier's transform multiplies by $|\xi|$ at almost no cost. That is the whole idea. In this tutorial we
-# write such a preconditioner in a few lines, compare it with those of the paper, and count iterations.
+# displacement out of it, and divides it by the wave number $|\xi|$. If we multiply a displacement by $|\xi|$, we nearly undo
+# $Q$. The Fourier transform does this at almost no cost. That is the whole idea. In this tutorial we write such a
+# preconditioner in a few lines. We compare it with those of a paper, A. Lotfi's *Domain-Decomposition based H^1/2 Seminorm
+# Preconditioners for Frictional Contact Problems*, and count iterations.
 #
 # Reading time: 10 minutes. You need the conjugate gradient method (CG) and the discrete Fourier transform (FFT).
 
@@ -62,9 +63,9 @@ assert plain[129] > 2 * plain[17]
 # ## Five lines
 #
 # A *circulant* matrix is one whose rows are shifted copies of each other, where the last entry goes round to the front.
-# The FFT diagonalises all circulants at once. Their eigenvalues, as a function of the wave number, are called the
-# *symbol*. We choose the symbol $|\xi|$. The contact line is not a circle, so we extend the displacement by zeros to a
-# closed curve of $2m$ nodes, and cut off what the product yields there.
+# The FFT diagonalises all circulant matrices at once. Their eigenvalues, as a function of the wave number, are called the
+# *symbol*. We choose the symbol $|\xi|$. The contact line is not a closed curve. So we extend the displacement by zeros to a
+# closed curve of $2m$ nodes, multiply there, and keep only the values on the contact line.
 
 
 # %%
@@ -98,9 +99,9 @@ assert ours[129] <= ours[17] + 4
 # | `p22` | the paper's equation 26: the inverse of a sparse circulant form of $Q$ itself |
 # | `neumann` | the square root of the Laplacian of the contact line, by the cosine transform |
 #
-# That its circulant is sparse is the paper's trick. It has about $\log_2 N$ entries per row, so it needs no FFT. Its symbol
-# is not $|\xi|$, but it stays near it. To see this, we give waves of displacement to each preconditioner and measure by
-# how much it multiplies them.
+# The trick of the paper is a circulant matrix that is sparse. It has about $\log_2 N$ entries per row for $N$ nodes, so that
+# it needs no FFT. Its symbol is not exactly $|\xi|$, but it stays near it. To see this, we give waves of displacement to each
+# preconditioner, and measure by how much it multiplies them.
 
 # %%
 nodes = 129
@@ -121,7 +122,7 @@ for name, P in choices.items():
     assert np.all((symbol / number > 0.2) & (symbol / number < 5))
 ax.loglog(number, number, "k--", lw=1, label="proportional to the wave number")
 ax.set(xlabel="number of the wave [-]", ylabel="what the preconditioner multiplies it by [-]")
-ax.legend(frameon=False)
+_ = ax.legend(frameon=False)
 
 # %% [markdown]
 # All of them follow the dashed line within a constant factor, and no more is needed. If $c_1 |\xi| \le$ symbol
@@ -171,7 +172,7 @@ assert np.all(ends > 0.5)  # no sign of a zero at the edge
 # Now look at the eigenvalues of $P Q$. They should lie close together.
 
 # %%
-fig, ax = plt.subplots(figsize=(7, 3.2), layout="constrained")
+fig, ax = plt.subplots(figsize=(6.0, 3.0), layout="constrained")
 spectra = {}
 for height, name in enumerate(("p21", "p22", "neumann")):
     PQ = preconditioner(problem, name) @ problem.Q
@@ -207,9 +208,9 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(motion[:
 
 # %% [markdown]
 # For all three, one eigenvalue stands apart on the right. It belongs to the *sway* of the punch, a motion of the whole
-# body. The symbol describes waves on the surface and knows nothing about it. CG needs only one or two more iterations to
-# deal with a single eigenvalue, so the condition number says less about CG than it seems to. It still pays to solve for
-# such a motion exactly (`contactopt.solving.preconditioners.deflated`), as the last exercise shows.
+# body. The symbol describes waves on the surface, and does not contain this motion. CG needs only one or two more iterations
+# to deal with a single eigenvalue. So the condition number looks worse than CG really is. It still pays to solve for such a
+# motion exactly (`contactopt.solving.preconditioners.deflated`), as the last exercise shows.
 #
 # ## Exercises
 #
@@ -217,8 +218,8 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(motion[:
 #
 # <details><summary>Solution</summary>
 #
-# The diagonal is nearly constant, because all nodes but those at the edge are alike. To divide by a constant changes
-# nothing for CG.
+# The diagonal is nearly constant, because all nodes but those at the edge are alike. Dividing by a constant makes no
+# difference to CG.
 #
 # ```python
 # jacobi = LinearOperator((2 * nodes,) * 2, matvec=lambda b: b / np.diag(problem.Q))

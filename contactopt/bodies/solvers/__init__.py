@@ -31,16 +31,24 @@ SOLVERS = {
 
 
 def make_solver(name: str, system: System) -> BodySolver:
-    """The solver of a body.
+    """Make the solver of a body's linear system.
 
     Parameters
     ----------
-    name : a key of SOLVERS, or 'auto' for the cheapest one (see choose)
-    system : the linear system of the body
+    name
+        A key of SOLVERS, or 'auto' for the cheapest one (see `choose`).
+    system
+        The linear system of the body.
+
+    Returns
+    -------
+    BodySolver
+        The solver, with its factors or its multigrid levels made.
 
     Raises
     ------
-    InputError : for a name that is not in the table, or a package that is not installed.
+    InputError
+        For a name that is not in the table, or a package that is not installed.
     """
     n, dim = system.A.shape[0], len(system.points)
     kind = solver_type(name, n, dim)
@@ -50,10 +58,28 @@ def make_solver(name: str, system: System) -> BodySolver:
 
 
 def solver_type(name: str, n: int, dim: int) -> type[BodySolver]:
-    """The class of the solver that make_solver would make for n unknowns in `dim` dimensions.
+    """Find the class of the solver that `make_solver` would make.
 
-    Its attributes `iterative` and `releases_lock` are known before there is a matrix. Raises InputError for a name that
-    is not in SOLVERS.
+    Its attributes `iterative` and `releases_lock` are known before there is a matrix.
+
+    Parameters
+    ----------
+    name
+        A key of SOLVERS, or 'auto'.
+    n
+        Number of unknowns of the body.
+    dim
+        Number of its dimensions, 2 or 3.
+
+    Returns
+    -------
+    type
+        The class.
+
+    Raises
+    ------
+    InputError
+        For a name that is not in SOLVERS.
     """
     if isinstance(name, str) and name == "auto":
         name = choose(n, dim, find_spec("pypardiso") is not None)
@@ -65,17 +91,44 @@ def solver_type(name: str, n: int, dim: int) -> type[BodySolver]:
 
 
 def factors_of(name: str, dim: int) -> str:
-    """Name of the solver with factors that `name` stands for in a large body: 'auto' takes PARDISO in space where it is installed."""
+    """Name the solver with factors that a name stands for in a large body.
+
+    Parameters
+    ----------
+    name
+        A key of SOLVERS, or 'auto', which takes PARDISO in space where it is installed.
+    dim
+        Number of dimensions, 2 or 3.
+
+    Returns
+    -------
+    str
+        A key of FACTORS_UP_TO.
+    """
     if name in FACTORS_UP_TO:
         return name
     return "pardiso" if dim == 3 and find_spec("pypardiso") is not None else "superlu"
 
 
 def choose(n: int, dim: int, pardiso: bool = False) -> str:
-    """Name of the cheapest solver for n unknowns in `dim` dimensions; `pardiso` says whether it is installed.
+    """Choose the cheapest solver of a body.
 
-    Sparse factors have about n log n entries in the plane and n^(4/3) in space, and take n^(3/2) and n^2 operations. The
-    work and the memory of multigrid grow with n. The limits stand in contactopt.bodies.solvers.constants.
+    Sparse factors have about n log n entries in the plane and n^(4/3) in space, and take n^(3/2) and n^2 operations.
+    The work and the memory of multigrid grow with n. The limits stand in contactopt.bodies.solvers.constants.
+
+    Parameters
+    ----------
+    n
+        Number of unknowns of the body.
+    dim
+        Number of its dimensions, 2 or 3.
+    pardiso
+        Whether PARDISO is installed.
+
+    Returns
+    -------
+    str
+        A name in SOLVERS.
     """
     if dim == 2 or n <= PARDISO_FROM:
         return "superlu"

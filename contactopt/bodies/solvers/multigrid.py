@@ -136,13 +136,13 @@ class VCycle:
         scale = _inverse_root(blocks.diagonal())
         while points.shape[1] > COARSEST:
             level = SparseProduct(_scaled(blocks, scale, scale), crew)
-            P, modes, points = coarsen(blocks, modes, points)
+            P, modes, points = _coarsen(blocks, modes, points)
             blocks = galerkin(P, blocks, crew)
             coarse = _inverse_root(blocks.diagonal())
             P = _scaled(P, np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0), coarse).tocsr()
             self.levels.append(
                 Level(
-                    level, SINGLE(largest_eigenvalue(level)), SparseProduct(P, crew), SparseProduct(P.T.tocsr(), crew)
+                    level, SINGLE(_largest_eigenvalue(level)), SparseProduct(P, crew), SparseProduct(P.T.tocsr(), crew)
                 )
             )
             scale = coarse
@@ -186,13 +186,30 @@ class Answer(NamedTuple):
 
 
 def conjugate_gradients(A: SparseProduct | BlockProduct, cycle: VCycle, load: np.ndarray, rtol: float) -> Answer:
-    """Solution of A x = load by conjugate gradients with a V-cycle.
+    """Solve A x = load by conjugate gradients with a V-cycle B.
 
-    It ends where (r' B r)^1/2, r the residual, has fallen by `rtol`.
+    It ends where (r' B r)^1/2, with the residual r, has fallen by `rtol`.
+
+    Parameters
+    ----------
+    A
+        Products with the matrix (n, n).
+    cycle
+        The V-cycle.
+    load
+        (n,) right-hand side [force].
+    rtol
+        Relative accuracy in the energy norm.
+
+    Returns
+    -------
+    Answer
+        The solution (n,) [length] and the number of iterations.
 
     Raises
     ------
-    BackendError : if it does not get there within MOST_ITERATIONS iterations, or r' B r is negative or not a number.
+    BackendError
+        If it does not get there within MOST_ITERATIONS iterations, or r' B r is negative or not a number.
     """
     r = np.array(load, dtype=float)
     x, p, size, goal = np.zeros(len(r)), np.zeros(len(r)), 1.0, None
@@ -217,7 +234,7 @@ def _dot(x: np.ndarray, y: np.ndarray) -> float:
     return float(np.einsum("i,i", x, y))
 
 
-def coarsen(A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
+def _coarsen(A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
     """Prolongation from the aggregates of nodes, and the modes and points of the aggregates.
 
     A (n, n) in blocks of nodes;  modes (n, j) it should represent exactly;  points (dim, nodes)
@@ -238,9 +255,21 @@ def coarsen(A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray) -> tuple[sp
 
 
 def near_neighbours(A: sp.bsr_matrix, points: np.ndarray) -> sp.csr_matrix:
-    """Neighbours in the graph of A at no more than NEAR times the distance of the nearest one, and each node itself.
+    """Find neighbours in the graph of A at no more than NEAR times the distance of the nearest one.
 
     The nearest neighbour of either node counts, so that the pattern is symmetric.
+
+    Parameters
+    ----------
+    A
+        Matrix in blocks of the k nodes.
+    points
+        (dim, k) places of the nodes [length].
+
+    Returns
+    -------
+    csr_matrix
+        (k, k) pattern of ones. Each node is its own neighbour.
     """
     count = points.shape[1]
     row, column = np.repeat(np.arange(count), np.diff(A.indptr)), A.indices
@@ -252,9 +281,19 @@ def near_neighbours(A: sp.bsr_matrix, points: np.ndarray) -> sp.csr_matrix:
 
 
 def rigid_motions(points: np.ndarray) -> np.ndarray:
-    """Translations and rotations at points (dim, k), as columns (k dim, 3 or 6), the unknowns of a point in a row.
+    """Write the translations and rotations of points as columns, which are the near-kernel of the stiffness.
 
     An axisymmetric body keeps the motions of its section: its hoop strain is small across a few elements.
+
+    Parameters
+    ----------
+    points
+        (dim, k) places [length]. Rotations are scaled by their extent.
+
+    Returns
+    -------
+    ndarray
+        (k dim, 3) in 2D, (k dim, 6) in 3D. The unknowns of a point are consecutive rows.
     """
     dim, k = points.shape
     x = points - points.mean(axis=1, keepdims=True)
@@ -268,7 +307,7 @@ def rigid_motions(points: np.ndarray) -> np.ndarray:
     return np.stack([c.T.ravel() for c in columns], axis=1)
 
 
-def largest_eigenvalue(A: SparseProduct) -> float:
+def _largest_eigenvalue(A: SparseProduct) -> float:
     """A little more than the largest eigenvalue of a symmetric matrix, by Lanczos' method."""
     n = A.matrix.shape[0]
     start = np.random.default_rng(0).standard_normal(n).astype(A.matrix.dtype)
@@ -279,12 +318,22 @@ def largest_eigenvalue(A: SparseProduct) -> float:
 def nodal_blocks(
     A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """A in blocks of nodes; its rows are made some at a time, for the copies take more than the result.
+    """Write a matrix in blocks of nodes. Its rows are made some at a time, for the copies take more than the result.
+
+    Parameters
+    ----------
+    A
+        (n, n) sparse matrix, or a block of one.
+    node, component
+        (n,) node and component of each unknown.
+    dim
+        Number of components of a node.
 
     Returns
     -------
-    The (k dim, k dim) matrix of the k nodes present, whose held unknowns are rows of their own; the place (n,) of each
-    unknown of A in it; and the nodes present (k,).
+    tuple
+        The (k dim, k dim) matrix of the k nodes present, whose held unknowns are rows of their own; the place (n,) of
+        each unknown of A in it; and the nodes present (k,).
     """
     present, own = np.unique(node, return_inverse=True)
     place, size = own * dim + component, len(present) * dim

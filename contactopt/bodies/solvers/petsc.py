@@ -37,7 +37,7 @@ class PetscSolver:
     releases_lock = False
 
     def __init__(self, system: System):
-        petsc, dim = library(), len(system.points)
+        petsc, dim = _library(), len(system.points)
         self.trailing, self.n = system.trailing, system.A.shape[0]
         blocks, self.place, present = nodal_blocks(system.A, system.node, system.component, dim)
         modes = rigid_motions(system.points[:, present])
@@ -98,7 +98,7 @@ class PetscSolver:
 
     def _acting(self, act: Any) -> Any:
         """PETSc's function of two vectors, as one of an array (n,) that returns an array (n,)."""
-        petsc = library()
+        petsc = _library()
 
         def acting(x: np.ndarray) -> np.ndarray:
             full, out = np.zeros(self.size), np.zeros(self.size)
@@ -113,7 +113,7 @@ class PetscSolver:
         return acting
 
 
-def library() -> Any:
+def _library() -> Any:
     """The module petsc4py.PETSc; InputError if it is missing."""
     try:
         from petsc4py import PETSc

@@ -96,7 +96,22 @@ class _Piece:
 
 
 def galerkin(P: sp.bsr_matrix, A: sp.bsr_matrix, crew: Crew) -> sp.bsr_matrix:
-    """P' A P, from pieces of rows of A, each in a thread of its own: A P is never there as a whole."""
+    """Compute P' A P from pieces of rows of A, each in a thread of its own: A P is never there as a whole.
+
+    Parameters
+    ----------
+    P
+        (n, m) prolongation in blocks.
+    A
+        (n, n) matrix in blocks.
+    crew
+        The threads.
+
+    Returns
+    -------
+    bsr_matrix
+        (m, m), the same whatever thread is done first.
+    """
     height = P.blocksize[0]
     found: dict[int, sp.bsr_matrix] = {}
 

@@ -55,7 +55,18 @@ def _free(executor: ThreadPoolExecutor, held: list[Any]) -> None:
 
 
 def factorise(A: sp.csc_matrix) -> Any:
-    """SciPy's SuperLU object of a symmetric positive definite matrix, eliminated in its own order, without pivoting."""
+    """Factorise a symmetric positive definite matrix by SuperLU, eliminated in its own order, without pivoting.
+
+    Parameters
+    ----------
+    A
+        (n, n) matrix in compressed columns.
+
+    Returns
+    -------
+    SuperLU
+        The factors, an object of SciPy.
+    """
     return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 

@@ -105,23 +105,57 @@ class BodySolver(Protocol):
         """That block times `load`, which is (m,) or (m, j)."""
 
     def restricted(self, at: np.ndarray) -> Product:
-        """Products with the block of the inverse of A on the unknowns `at` (m,), as a function (load, rtol) -> product.
+        """Prepare products with the block of the inverse of A on some unknowns.
 
-        The function takes loads of shape (m,) or (m, j).
+        Parameters
+        ----------
+        at
+            (m,) the unknowns.
+
+        Returns
+        -------
+        callable
+            A function (load, rtol) of loads (m,) or (m, j) to the product of that shape.
         """
 
 
 def asked(trailing: np.ndarray | None) -> np.ndarray:
-    """`trailing`; InputError if it is None."""
+    """Check that unknowns were named whose block of the inverse is asked for.
+
+    Parameters
+    ----------
+    trailing
+        (m,) unknowns, or None.
+
+    Returns
+    -------
+    ndarray
+        The unknowns.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
     if trailing is None:
         raise InputError("no unknowns were named whose block of the inverse is asked for; give `trailing`.")
     return trailing
 
 
 def triangle_inverse(R: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Inverse of R R', (m, m). Its row and column place[i] become row and column i.
+    """Invert R R' from its triangular factor, in another order of the unknowns.
 
-    R is (m, m) lower triangular, place (m,) a permutation.
+    Parameters
+    ----------
+    R
+        (m, m) lower triangular factor.
+    place
+        (m,) a permutation: row and column place[i] of the inverse become row and column i.
+
+    Returns
+    -------
+    ndarray
+        (m, m) inverse, symmetric to the last digit.
     """
     X = la.solve_triangular(R, np.eye(len(R)), lower=True, check_finite=False)
     C = X.T @ X  # NumPy keeps it symmetric
@@ -129,14 +163,44 @@ def triangle_inverse(R: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 
 def triangle_product(R: np.ndarray, place: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """triangle_inverse(R, place) @ load, by two substitutions; load is (m,) or (m, j)."""
+    """Multiply with the matrix of `triangle_inverse`, by two substitutions.
+
+    Parameters
+    ----------
+    R, place
+        As for `triangle_inverse`.
+    load
+        (m,) or (m, j).
+
+    Returns
+    -------
+    ndarray
+        The product, of the shape of `load`.
+    """
     x = np.empty(load.shape)
     x[place] = load
     return np.asarray(la.cho_solve((R, True), x, check_finite=False))[place]
 
 
 def inverse_block(solver: Any, at: np.ndarray, n: int, columns: int = 64) -> np.ndarray:
-    """The block of the inverse on the unknowns `at` of n, by solves with unit loads, some columns at a time."""
+    """Compute a block of the inverse by solves with unit loads, some columns at a time.
+
+    Parameters
+    ----------
+    solver
+        A BodySolver of n unknowns.
+    at
+        (m,) the unknowns of the block.
+    n
+        Number of unknowns.
+    columns
+        How many loads are solved for at a time.
+
+    Returns
+    -------
+    ndarray
+        (m, m) block, symmetric to the last digit [length / force].
+    """
     C = np.empty((len(at), len(at)))
     for start in range(0, len(at), columns):
         chosen = at[start : start + columns]
@@ -147,7 +211,26 @@ def inverse_block(solver: Any, at: np.ndarray, n: int, columns: int = 64) -> np.
 
 
 def block_product(solver: Any, at: np.ndarray, n: int, load: np.ndarray, rtol: float | None) -> np.ndarray:
-    """The block of the inverse on the unknowns `at` of n, times load (m,) or (m, j), by one solve."""
+    """Multiply with a block of the inverse, by one solve.
+
+    Parameters
+    ----------
+    solver
+        A BodySolver of n unknowns.
+    at
+        (m,) the unknowns of the block.
+    n
+        Number of unknowns.
+    load
+        (m,) or (m, j) [force].
+    rtol
+        Relative accuracy that is asked of an iterative solver; None: its own.
+
+    Returns
+    -------
+    ndarray
+        The product, of the shape of `load` [length].
+    """
     full = np.zeros((n, *load.shape[1:]))
     full[at] = load
     return np.asarray(solver.solve(full, rtol)[at])

@@ -26,7 +26,7 @@ function filtered() {
 
 function chart(id, traces, x, y) {
   const layout = {
-    margin: {l: 65, r: 15, t: 10, b: 50}, hovermode: "closest", showlegend: true, legend: {orientation: "h", y: get(id).clientHeight < 350 ? -0.5 : -0.22, yanchor: "top", font: {size: 11}}, uirevision: "kept",
+    margin: {l: 65, r: 15, t: 32, b: 50}, hovermode: "closest", showlegend: true, legend: {orientation: "h", y: get(id).clientHeight < 350 ? -0.5 : -0.22, yanchor: "top", font: {size: 11}}, uirevision: "kept",
     xaxis: {title: {text: x.title}, type: x.type, exponentformat: "power", nticks: 6, range: x.range}, yaxis: {title: {text: y.title}, type: y.type, exponentformat: "power", range: y.range},
   };
   Plotly.react(get(id), traces, layout, {responsive: true, displaylogo: false});
@@ -70,7 +70,7 @@ function drawProfile(rows, time) {
     };
   });
   const log = type("x") === "log";
-  chart("profile", traces, {title: "ratio: time / that of the best method on the instance [-]", type: type("x"), range: log ? [0, Math.log10(largest)] : [1, largest]},
+  chart("profile", traces, {title: "ratio: time / the best method's [-]", type: type("x"), range: log ? [0, Math.log10(largest)] : [1, largest]},
     {title: `share of ${instances.size} instances solved`, type: "linear", range: [0, 1.03]});
 }
 
@@ -82,7 +82,7 @@ function drawSize(rows, time) {
       line: {color: style.color, dash: style.dash}, marker: {symbol: style.symbol, size: 8}, hovertemplate: "%{x} contacts: %{y:.3g} s<extra>%{fullData.name}</extra>",
     };
   });
-  chart("size", traces, {title: "contacts", type: type("x")}, {title: `${WORDS[time]}, median of what was solved`, type: type("y")});
+  chart("size", traces, {title: "contacts", type: type("x")}, {title: `${WORDS[time]}, median`, type: type("y")});
 }
 
 function drawConvergence() {

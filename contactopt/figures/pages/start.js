@@ -14,6 +14,7 @@ function bytes(text) {
 
 function unpack(packed) {  // the numbers of an array, without its shape
   const data = bytes(packed.data).buffer;
+  if (packed.type === "u2") return Float32Array.from(new Uint16Array(data), (value) => packed.low + packed.step * value);
   return packed.type === "f4" ? new Float32Array(data) : new Int32Array(data);
 }
 

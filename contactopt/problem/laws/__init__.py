@@ -120,61 +120,170 @@ class Law:
         return self.coefficient > 0
 
     def bound(self, r_n: np.ndarray) -> np.ndarray:
-        """(k,) largest |r_t| [force] under the normal forces r_n (k,)."""
+        """Compute the largest tangential force that each contact can carry.
+
+        Parameters
+        ----------
+        r_n
+            (k,) normal forces [force].
+
+        Returns
+        -------
+        ndarray
+            (k,) largest |r_t| [force].
+        """
         raise NotImplementedError
 
     def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
-        """The projection of y (k, dim) on the set K of forces, and its generalised derivative.
+        """Project points on the set K of forces, with the generalised derivative of the projection.
 
-        Where K depends on the normal force it is that of r_n (k,), which the derivative takes as given.
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+        r_n
+            (k,) normal forces that say which set K is, where it depends on them. The derivative takes them as given.
+
+        Returns
+        -------
+        tuple
+            The nearest points (k, dim), and their derivatives (k, dim, dim).
         """
         raise NotImplementedError
 
     def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
-        """The projection alone, (k, dim)."""
+        """Project points on the set K of forces.
+
+        Parameters
+        ----------
+        y, r_n
+            As for `nearest_derivative`.
+
+        Returns
+        -------
+        ndarray
+            (k, dim) nearest points [force].
+        """
         return self.nearest_derivative(y, r_n)[0]
 
     def project(self, y: np.ndarray) -> Projected:
-        """The map P of Newton's equations r = P(r - rho u), and its generalised derivative, at y (k, dim)."""
+        """Evaluate the map P of Newton's equations r = P(r - rho u), and its generalised derivative.
+
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+
+        Returns
+        -------
+        tuple
+            P(y) (k, dim), and its derivatives (k, dim, dim).
+        """
         return self.nearest_derivative(y, y[:, 0])
 
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
-        """(k, dim) derivative of `project` at the point y (k, dim) by the law's parameter at each contact.
+        """Differentiate `project` by the law's parameter at each contact.
 
-        Raises InputError for a law that does not know it.
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+
+        Returns
+        -------
+        ndarray
+            (k, dim) derivatives.
+
+        Raises
+        ------
+        InputError
+            For a law that does not know it.
         """
         raise InputError(f"the law {type(self).__name__} has no derivative by its parameter (project_by_parameter).")
 
     def kinks(self, y: np.ndarray, distance: float) -> Kinks:
-        """The contacts whose point y (k, dim) lies within a distance [force] of a kink of `project`."""
+        """Find the contacts whose point lies near a kink of `project`.
+
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+        distance
+            How near counts [force].
+
+        Returns
+        -------
+        Kinks
+            Two masks (k,).
+        """
         normal = (np.abs(y[:, 0]) <= distance) & ((self.lowest == 0) | self.rough)
         slack = np.linalg.norm(y[:, 1:], axis=1) - self.bound(y[:, 0])
         return Kinks(normal, (np.abs(slack) <= distance) & self.rough & (normal | ~self.idle(y)))
 
     def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
-        """The points y (k, dim) with those of the masks moved onto their kinks."""
+        """Move points onto their kinks.
+
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+        kinks
+            The masks of the points that are moved.
+
+        Returns
+        -------
+        ndarray
+            (k, dim) points. The others are as before.
+        """
         out = y.copy()
         out[kinks.normal, 0] = 0.0
         out[:, 1:] = np.where(kinks.tangential[:, None], unit(y[:, 1:]) * self.bound(out[:, 0])[:, None], y[:, 1:])
         return out
 
     def idle(self, y: np.ndarray) -> np.ndarray:
-        """(k,) mask of points y (k, dim) at which `project` and its derivative are sure to be zero."""
+        """Tell at which points `project` and its derivative are sure to be zero.
+
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+
+        Returns
+        -------
+        ndarray
+            (k,) mask.
+        """
         return np.zeros(len(y), dtype=bool)
 
     def opening(self, u_t: np.ndarray) -> np.ndarray:
-        """g (k,) [length]: what is added to the gap where contacts slip by u_t (k, dim - 1)."""
+        """Compute what is added to the gap where contacts slip.
+
+        Parameters
+        ----------
+        u_t
+            (k, dim - 1) tangential displacements [length].
+
+        Returns
+        -------
+        ndarray
+            g (k,) [length].
+        """
         return np.zeros(len(u_t))
 
     def natural_map(self, r: np.ndarray, u: np.ndarray, rho: float | np.ndarray) -> np.ndarray:
-        """proj_K(r - rho (u + g n)) (k, dim): equal to r exactly where r and u obey the law.
+        """Evaluate proj_K(r - rho (u + g n)), which is equal to r exactly where r and u obey the law.
 
         Parameters
         ----------
         r, u
-            Forces and displacements (k, dim), normal first.
+            Forces [force] and displacements [length] (k, dim), normal first.
         rho
             Step [force / length], one number or one per contact (k,).
+
+        Returns
+        -------
+        ndarray
+            (k, dim) forces [force].
         """
         step = np.asarray(rho)[..., None] if np.ndim(rho) else rho
         shifted = r - step * u
@@ -182,40 +291,146 @@ class Law:
         return self.nearest(shifted, r[:, 0])
 
     def pressed(self, r: np.ndarray) -> np.ndarray:
-        """(k,) mask of the contacts that touch: they carry a normal force beyond rounding, or cannot open."""
+        """Tell which contacts touch: they carry a normal force beyond rounding, or cannot open.
+
+        Parameters
+        ----------
+        r
+            (k, dim) contact forces, normal first [force].
+
+        Returns
+        -------
+        ndarray
+            (k,) mask.
+        """
         size = np.abs(r[:, 0])
         return np.asarray((size > PRESSED * size.max(initial=0.0)) | (self.lowest < 0))
 
     def sticking(self, r: np.ndarray) -> np.ndarray:
-        """(k,) mask of the pressed contacts whose tangential force is below its bound."""
+        """Tell which contacts are pressed and carry a tangential force below its bound.
+
+        Parameters
+        ----------
+        r
+            (k, dim) contact forces, normal first [force].
+
+        Returns
+        -------
+        ndarray
+            (k,) mask.
+        """
         return self.pressed(r) & (np.linalg.norm(r[:, 1:], axis=1) < (1 - BELOW) * self.bound(r[:, 0]))
 
     def slipping(self, r: np.ndarray) -> np.ndarray:
-        """(k,) mask of the pressed contacts whose tangential force is at its bound."""
+        """Tell which contacts are pressed and carry a tangential force at its bound.
+
+        Parameters
+        ----------
+        r
+            (k, dim) contact forces, normal first [force].
+
+        Returns
+        -------
+        ndarray
+            (k,) mask.
+        """
         return self.pressed(r) & ~self.sticking(r)
 
     def scaled(self, force: float) -> Self:
-        """The same law where forces are counted in units of `force`."""
+        """Write the same law with forces in another unit.
+
+        Parameters
+        ----------
+        force
+            The unit [force].
+
+        Returns
+        -------
+        Law
+            The law in that unit.
+        """
         return self
 
     def times(self, factor: float) -> Self:
-        """The same law with its friction multiplied by a factor."""
+        """Multiply the friction of the law.
+
+        Parameters
+        ----------
+        factor
+            What it is multiplied with.
+
+        Returns
+        -------
+        Law
+            The law with that friction.
+        """
         return self._mapped(lambda parameter: factor * parameter)
 
     def shifted(self, change: np.ndarray) -> Self:
-        """The same law with its parameter changed by (k,), at least zero."""
+        """Change the parameter of the law. It does not fall below zero.
+
+        Parameters
+        ----------
+        change
+            (k,) what is added.
+
+        Returns
+        -------
+        Law
+            The law with that parameter.
+        """
         return self._mapped(lambda parameter: np.maximum(parameter + change, 0.0))
 
     def select(self, contacts: np.ndarray) -> Law:
-        """The law of some contacts alone: indices, with repetitions if wanted, or a mask."""
+        """Take the law of some contacts alone.
+
+        Parameters
+        ----------
+        contacts
+            Their numbers, with repetitions if wanted, or a mask (k,).
+
+        Returns
+        -------
+        Law
+            The law of these contacts.
+        """
         return self._mapped(lambda parameter: parameter[contacts])
 
     def lumped(self, first: np.ndarray, count: int) -> Law:
-        """The law of groups of `count` contacts that act as one, of which `first` are the first ones."""
+        """Make the law of groups of contacts that act as one.
+
+        Parameters
+        ----------
+        first
+            The first contact of each group.
+        count
+            Number of contacts of a group.
+
+        Returns
+        -------
+        Law
+            The law, with one contact for each group.
+        """
         return self.select(first)
 
     def spread(self, k: int) -> Self:
-        """The law of k contacts: numbers become arrays (k,). InputError on arrays of another length."""
+        """Make the law of k contacts: numbers become arrays (k,).
+
+        Parameters
+        ----------
+        k
+            Number of contacts.
+
+        Returns
+        -------
+        Law
+            The law with arrays.
+
+        Raises
+        ------
+        InputError
+            On arrays of another length.
+        """
         for name in self.parameters:
             if np.ndim(getattr(self, name)) and np.shape(getattr(self, name)) != (k,):
                 raise InputError(f"{name} must have shape {(k,)}; got {np.shape(getattr(self, name))}.")
@@ -223,9 +438,19 @@ class Law:
 
     @classmethod
     def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Law:
-        """The law of a scene's contacts from the values (k,) that the scene gives and the nodal areas (k,).
+        """Make the law of a scene's contacts from the values that the scene gives.
 
-        The values are friction coefficients unless the law says otherwise.
+        Parameters
+        ----------
+        values
+            (k,) friction coefficients, unless the law says otherwise.
+        areas
+            (k,) nodal areas [length^2].
+
+        Returns
+        -------
+        Law
+            The law of the k contacts.
         """
         return cls(values)  # type: ignore[call-arg]
 
@@ -240,7 +465,23 @@ class Law:
 
 
 def find_law(name: str) -> type[Law]:
-    """The class of the law of that name; InputError if there is none."""
+    """Find the class of a law by its name.
+
+    Parameters
+    ----------
+    name
+        A name in LAWS.
+
+    Returns
+    -------
+    type
+        The subclass of Law.
+
+    Raises
+    ------
+    InputError
+        If there is no law of that name.
+    """
     if not isinstance(name, str) or name not in LAWS:
         raise InputError(f"unknown law {name!r}; choose from {', '.join(LAWS)}.")
     module, cls, _ = LAWS[name]
@@ -249,17 +490,22 @@ def find_law(name: str) -> type[Law]:
 
 
 def make_law(name: str, value: Any, areas: np.ndarray, places: np.ndarray) -> Law:
-    """The law that a scene means at its contacts.
+    """Make the law that a scene means at its contacts.
 
     Parameters
     ----------
     name
         A name in LAWS.
     value
-        What the law reads: a friction coefficient, or for `tresca` a traction bound [stress]. One number, an array (k,),
-        or a function of the places (dim, k) that gives either.
+        What the law reads: a friction coefficient, or for `tresca` a traction bound [stress]. One number, an array
+        (k,), or a function of the places (dim, k) that gives either.
     areas, places
         Nodal areas (k,) and positions (dim, k) of the contacts.
+
+    Returns
+    -------
+    Law
+        The law, with one parameter for each contact.
 
     Raises
     ------

@@ -114,10 +114,24 @@ class Mixed(Law):
 
 
 def join(parts: Sequence[tuple[Law, np.ndarray]]) -> Law:
-    """One law for all contacts from laws of disjoint contacts, given as (law, its contacts (k_i,)).
+    """Make one law for all contacts from laws of disjoint contacts.
 
     Parts of one kind become one: contact pairs that differ only in mu give a single Coulomb law.
-    Raises InputError if a contact has no law or two.
+
+    Parameters
+    ----------
+    parts
+        For each part its law and the numbers (k_i,) of its contacts, together 0 ... k - 1.
+
+    Returns
+    -------
+    Law
+        The law of the k contacts; a Mixed law where the parts are of several kinds.
+
+    Raises
+    ------
+    InputError
+        If a contact has no law or two.
     """
     kinds: dict[type[Law], list[tuple[Law, np.ndarray]]] = {}
     for law, own in parts:

@@ -99,7 +99,7 @@ QP: dict[str, Backend] = {
             "qp",
             "proxsuite",
             "proxsuite",
-            {"eps_abs": TIGHT, "eps_rel": 0.0, "max_iter": 10_000},
+            {"eps_abs": TIGHT, "eps_rel": 0.0, "max_iter": 1_000},
             steps="max_iter",
         ),
         Backend("clarabel", "qp", "clarabel", "clarabel", _CLARABEL, sparse=True, clock="time_limit"),
@@ -143,14 +143,45 @@ CONIC: dict[str, Backend] = {
 
 
 def attempts(solver: Any, solve: Callable[[Any], Answer]) -> Iterator[tuple[str, Callable[[], Answer]]]:
-    """For semismooth.certified: a bridge (BoxQP, DiscSOCP) with its backend as it is, then at tighter settings."""
+    """List the attempts of a bridge for `semismooth.certified`: with its backend as it is, then at tighter settings.
+
+    Parameters
+    ----------
+    solver
+        A bridge, such as BoxQP or DiscSOCP.
+    solve
+        A function of a bridge that returns its answer.
+
+    Yields
+    ------
+    tuple
+        The name of the backend, and a function without arguments that makes the attempt.
+    """
     for backend in (solver.backend, solver.backend.tightened()):
         bridge = replace(solver, backend=backend)
         yield backend.name, partial(solve, bridge)
 
 
 def find(name: str, table: Mapping[str, Backend]) -> Backend:
-    """The backend of that name; InputError with what to do if it is unknown or not installed."""
+    """Find a backend by its name.
+
+    Parameters
+    ----------
+    name
+        A name in the table.
+    table
+        QP or CONIC.
+
+    Returns
+    -------
+    Backend
+        The backend.
+
+    Raises
+    ------
+    InputError
+        If it is unknown or not installed, with what to do.
+    """
     if name not in table:
         kind = next(iter(table.values())).kind
         raise InputError(f"unknown {kind} backend {name!r}; choose from {', '.join(sorted(table))}.")

@@ -74,7 +74,20 @@ class DiscSOCP:
 
 
 def run(backend: Backend, problem: Any) -> None:
-    """Solve a cvxpy problem; BackendError, naming the backend, if it crashes or leaves no answer."""
+    """Solve a cvxpy problem. The answer stands in its variables.
+
+    Parameters
+    ----------
+    backend
+        The conic backend.
+    problem
+        The cvxpy problem.
+
+    Raises
+    ------
+    BackendError
+        If the backend crashes or leaves no answer. The message names it.
+    """
     import cvxpy as cp
 
     try:
@@ -92,7 +105,20 @@ def run(backend: Backend, problem: Any) -> None:
 
 
 def check_semidefinite(Q: np.ndarray) -> None:
-    """Cholesky of Q plus rounding: cvxpy's own test of convexity fails at random and on small numbers."""
+    """Check that a matrix is positive semidefinite but for rounding, by a Cholesky factorisation.
+
+    cvxpy's own test of convexity fails at random and on small numbers.
+
+    Parameters
+    ----------
+    Q
+        (n, n) matrix.
+
+    Raises
+    ------
+    BackendError
+        If it is not.
+    """
     try:
         la.cholesky(Q + 1e-10 * np.trace(Q) / max(1, len(Q)) * np.eye(len(Q)), check_finite=False)
     except la.LinAlgError as error:

@@ -15,17 +15,17 @@ from scipy.sparse.linalg import splu
 
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import diagonal
-from contactopt.solving.constants import LOOSE
-from contactopt.solving.kernels.bonded import SOFTEST, Bonded
+from contactopt.solving.constants import KRYLOV_FIRST, KRYLOV_LOOSEST, KRYLOV_TIGHTEST, LOOSE
+from contactopt.solving.kernels.bonded import LEAST_PIVOT, Bonded
 from contactopt.solving.kernels.krylov import krylov_step
 from contactopt.solving.kernels.semismooth import RIDGE, Equations
 from contactopt.solving.preconditioners import Preconditioner
 
-FIRST, LOOSEST, TIGHTEST = 1e-2, 0.1, 1e-4  # accuracy of an iterative step: the first, and the bounds of the others
+FIRST = KRYLOV_FIRST  # also of the bonded solution
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
 
 LEAST_REACH = 1e-12  # of a multiplier's column of V, which is dimensionless
-HELD = 1e-8  # share of its motion that the glued contacts must feel of every multiplier
+LEAST_FELT = 1e-8  # share of its motion that the glued contacts must feel of every multiplier
 
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
 # equations, error, balance, D, relative accuracy -> dr, dlambda or None
@@ -33,10 +33,24 @@ Step = Callable[[Equations, np.ndarray, np.ndarray, np.ndarray, float], Iterate 
 
 
 def forcing(residual: float, last: float) -> float:
-    """Relative accuracy of the linear system that is worth its price."""
+    """Choose the relative accuracy of the linear system of a Newton step that is worth its price.
+
+    Source: Eisenstat, Walker (1996), Choosing the forcing terms in an inexact Newton method, SIAM J. Sci. Comput. 17,
+    16-32.
+
+    Parameters
+    ----------
+    residual, last
+        The residual of the equations now and before the last step; `last` is infinite before the first step.
+
+    Returns
+    -------
+    float
+        The accuracy, between KRYLOV_TIGHTEST and KRYLOV_LOOSEST.
+    """
     if last in (0.0, np.inf):
-        return FIRST if last else TIGHTEST
-    return min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2))
+        return FIRST if last else KRYLOV_TIGHTEST
+    return min(KRYLOV_LOOSEST, max(KRYLOV_TIGHTEST, 0.5 * (residual / last) ** 2))
 
 
 def coulomb_equations(
@@ -45,9 +59,26 @@ def coulomb_equations(
     weight: float = 0.0,
     stiffer: np.ndarray | float = 1.0,
 ) -> Equations:
-    """The Alart-Curnier equations of a problem, rho_i = 1 over the mean compliance of contact i.
+    """Write the Alart-Curnier equations of a problem, with rho_i = 1 over the mean compliance of contact i.
 
-    stiffer  (k,) by what the compliance that Newton's steps should see is smaller than the diagonal of Q
+    Source: Alart, Curnier (1991), A mixed formulation for frictional contact problems prone to Newton like solution
+    methods.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem.
+    center
+        (k, dim) forces of a proximal term, if there is one.
+    weight
+        The weight of the proximal term, a compliance.
+    stiffer
+        By what the compliance that Newton's steps should see is smaller than the diagonal of Q, (k,) or one number.
+
+    Returns
+    -------
+    Equations
+        The equations, which can be evaluated and solved for a Newton step.
     """
     compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1) / stiffer + weight
     return Equations(
@@ -74,15 +105,27 @@ def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> n
 
 
 def definite(Q: sp.csr_array) -> bool:
-    """Whether a sparse symmetric Q is safely positive definite, as that of elastic bodies without redundant contacts."""
+    """Say whether a sparse symmetric Q is safely positive definite, as that of elastic bodies without redundant
+    contacts.
+
+    Parameters
+    ----------
+    Q
+        (n, n) sparse matrix.
+
+    Returns
+    -------
+    bool
+        False also where its factorisation fails.
+    """
     try:
         pivots = splu(sp.csc_array(Q), diag_pivot_thresh=0.0, options={"SymmetricMode": True}).U.diagonal()
     except RuntimeError:
         return False
-    return bool(pivots.min() > SOFTEST**2 * pivots.max())
+    return bool(pivots.min() > LEAST_PIVOT**2 * pivots.max())
 
 
-def bonded_factor(problem: InterfaceProblem) -> Bonded | None:
+def _bonded_factor(problem: InterfaceProblem) -> Bonded | None:
     """The factorised bonded system where it pays: elastic bodies pressed together by a plate, Q of full rank."""
     try:
         return Bonded(problem.Q, problem.V) if len(problem.s) else None
@@ -91,7 +134,18 @@ def bonded_factor(problem: InterfaceProblem) -> Bonded | None:
 
 
 def krylov(P: Preconditioner) -> tuple[Step, Step]:
-    """Newton's steps from products with Q, and those of the bonded solution: the same."""
+    """Make Newton's steps from products with Q, and those of the bonded solution, which are the same.
+
+    Parameters
+    ----------
+    P
+        The preconditioner of the steps.
+
+    Returns
+    -------
+    tuple
+        Two functions (equations, error, balance, D, rtol) -> step.
+    """
 
     def step(equations, error, balance, D, rtol):  # type: ignore[no-untyped-def]
         return krylov_step(equations, P, error, balance, D, rtol)
@@ -100,26 +154,49 @@ def krylov(P: Preconditioner) -> tuple[Step, Step]:
 
 
 def dense(problem: InterfaceProblem) -> tuple[Step, Step]:
-    """Newton's steps, and those of the bonded solution."""
-    factor = bonded_factor(problem)
+    """Make Newton's steps by factorisations of arrays, and those of the bonded solution.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem with Q an array.
+
+    Returns
+    -------
+    tuple
+        Two functions (equations, error, balance, D, rtol) -> step, or None where the system is singular.
+    """
+    factor = _bonded_factor(problem)
 
     def steps(ridge: float) -> Step:
-        return lambda equations, error, balance, D, rtol: newton_step(equations, factor, error, balance, D, ridge)
+        return lambda equations, error, balance, D, rtol: _newton_step(equations, factor, error, balance, D, ridge)
 
     return steps(RIDGE), steps(GLUE)
 
 
 def sparse(problem: InterfaceProblem) -> tuple[Step, Step]:
-    """Newton's steps by sparse factors, for many bodies of which each touches few others, and those of the bonded solution."""
+    """Make Newton's steps by sparse factors, for many bodies of which each touches few others, and those of the bonded
+    solution.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem with Q sparse.
+
+    Returns
+    -------
+    tuple
+        Two functions (equations, error, balance, D, rtol) -> step, or None where the system is singular.
+    """
     V = sp.csr_array(problem.V)
 
     def steps(ridge: float) -> Step:
-        return lambda equations, error, balance, D, rtol: sparse_step(equations, V, error, balance, D, ridge)
+        return lambda equations, error, balance, D, rtol: _sparse_step(equations, V, error, balance, D, ridge)
 
     return steps(RIDGE), steps(GLUE)
 
 
-def sparse_step(
+def _sparse_step(
     equations: Equations, V: sp.csr_array, error: np.ndarray, balance: np.ndarray, D: np.ndarray, ridge: float
 ) -> Iterate | None:
     """One step by the factors of [[I - D + D rho (Q + ridge I), D rho V], [V', 0]]; None if it is singular."""
@@ -137,7 +214,7 @@ def sparse_step(
     return (x[:n].reshape(k, d), x[n:]) if np.all(np.isfinite(x)) else None
 
 
-def newton_step(
+def _newton_step(
     equations: Equations,
     factor: Bonded | None,
     error: np.ndarray,
@@ -156,10 +233,23 @@ def newton_step(
 
 
 def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
-    """The bonded solution: all contacts glued if a plate presses the bodies together, else those that would penetrate.
+    """Find the bonded solution, from which Newton's method starts.
 
-    Without a plate no force at all, if its residual is smaller: forces that bond rigid bodies are of any size. On elastic
+    All contacts are glued if a plate presses the bodies together, else those that would penetrate. Without a plate the
+    start has no force at all, if its residual is smaller: forces that bond rigid bodies are of any size. On elastic
     bodies Newton's method cycles from there, because it takes contacts for sliding before friction acts.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem.
+    step
+        How the bonded system is solved; by default with factors.
+
+    Returns
+    -------
+    tuple
+        Forces (k, dim) and multipliers (p,).
     """
     zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
     glued = glued_contacts(problem)
@@ -176,12 +266,22 @@ def cold_start(problem: InterfaceProblem, step: Step | None = None) -> Iterate:
 
 
 def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
-    """Mask (k,) of the contacts that the bonded solution glues.
+    """Choose the contacts that the bonded solution glues.
 
-    Where loads press free bodies together these are all contacts that the loads may close, and otherwise those that would
-    penetrate. One contact i that bears the load F of a pair alone closes once the bodies have approached by q_i + Q_ii F.
-    Further contacts only stiffen the pair. So no contact closes whose gap exceeds the least of these approaches, unless a body turns.
-    All are glued where the near ones alone would leave a motion free.
+    Where loads press free bodies together these are all contacts that the loads may close, and otherwise those that
+    would penetrate. One contact i that bears the load F of a pair alone closes once the bodies have approached by q_i +
+    Q_ii F. Further contacts only stiffen the pair. So no contact closes whose gap exceeds the least of these
+    approaches, unless a body turns. All are glued where the near ones alone would leave a motion free.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem.
+
+    Returns
+    -------
+    ndarray
+        (k,) mask.
     """
     gap = problem.q[:, 0]
     closed = np.asarray((problem.law.lowest < 0) | (gap < 0))
@@ -199,14 +299,27 @@ def _determined(problem: InterfaceProblem, closed: np.ndarray) -> bool:
     """Whether the glued contacts hold every motion that all of them hold."""
     V = sp.csr_array(problem.V)
     near = V[np.repeat(closed, problem.dim)]
-    whole, held = (V.T @ V).toarray(), (near.T @ near).toarray()
+    whole, felt = (V.T @ V).toarray(), (near.T @ near).toarray()
     try:
-        return bool(la.eigh(held, whole, eigvals_only=True, subset_by_index=[0, 0])[0] > HELD)
+        return bool(la.eigh(felt, whole, eigvals_only=True, subset_by_index=[0, 0])[0] > LEAST_FELT)
     except la.LinAlgError:
         return False
 
 
 def glued_projection(equations: Equations, glued: np.ndarray) -> Equations:
-    """The equations in which the contacts of the mask (k,) are glued and the others carry no force."""
+    """Write the equations in which some contacts are glued and the others carry no force.
+
+    Parameters
+    ----------
+    equations
+        The equations of contact and friction.
+    glued
+        (k,) mask of the contacts that are glued.
+
+    Returns
+    -------
+    Equations
+        The same equations with another map. They are linear.
+    """
     D = np.where(glued[:, None, None], np.eye(equations.q.shape[1]), 0.0)
     return replace(equations, project=lambda y: (np.where(glued[:, None], y, 0.0), D))

@@ -42,6 +42,7 @@ def project_balanced(
     k, d = y.shape
     size = np.abs(s) + np.abs(V).sum(axis=0) * 1e-3
 
+    # lambda minimises a convex function with the gradient -(V'P + s): Newton's method on it, with a line search.
     def evaluate(lam: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
         z = y - step * (V @ lam).reshape(k, d)
         P, D = project(z)
@@ -53,9 +54,11 @@ def project_balanced(
         check_time()
         if np.all(np.abs(error) <= EXACT * size):
             break
+        # Its second derivative is step V'D V; a little of V'V keeps it regular where no contact is closed.
         DV = np.einsum("kab,kbp->kap", D, V.reshape(k, d, -1)).reshape(V.shape)
         hessian = step * (V.T @ DV + CURVATURE * np.diag(np.sum(V**2, axis=0)))
         move, length = np.linalg.solve(hessian, error), 1.0
+        # Shorten the step until the function falls by a share of what its slope promises (Armijo).
         while length > 1e-18:
             trial = evaluate(lam + length * move)
             slack = 1e-14 * (1 + abs(value))  # rounding of the value

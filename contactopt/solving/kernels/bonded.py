@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 
-SOFTEST = 1e-7  # least diagonal entry of the factor, over the largest: below, Q is too near to singular for this
+LEAST_PIVOT = 1e-7  # least diagonal entry of the factor, over the largest: below, Q is too near to singular for this
 
 
 class Bonded:
@@ -27,7 +27,7 @@ class Bonded:
             raise la.LinAlgError("Q is not symmetric")
         self.factor = la.cho_factor(Q, lower=True, check_finite=False)
         diagonal = np.diag(self.factor[0])
-        if diagonal.min() < SOFTEST * diagonal.max():
+        if diagonal.min() < LEAST_PIVOT * diagonal.max():
             raise la.LinAlgError("Q is nearly singular")
         self.V = V
         self.X = la.cho_solve(self.factor, V, check_finite=False) if V.shape[1] else V
@@ -44,7 +44,18 @@ class Bonded:
         return dr - self.X @ multipliers, multipliers
 
     def inverse(self, unknowns: np.ndarray) -> np.ndarray:
-        """The columns of G (n, m) for these unknowns (m,). Each is computed once and kept."""
+        """Compute columns of G, the inverse of Q under the balance. Each is computed once and kept.
+
+        Parameters
+        ----------
+        unknowns
+            (m,) numbers of the columns.
+
+        Returns
+        -------
+        ndarray
+            (n, m).
+        """
         new = unknowns[self.place[unknowns] < 0]
         if len(new):
             unit = np.zeros((len(self.V), len(new)))
@@ -57,8 +68,31 @@ class Bonded:
     def step(
         self, rho: np.ndarray, error: np.ndarray, balance: np.ndarray, D: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """dr (k, d), dlambda (p,) of the Newton step that Equations.step takes; LinAlgError if its system is singular."""
+        """Solve for the Newton step that `Equations.step` takes.
+
+        Parameters
+        ----------
+        rho
+            (k,) steps of the map.
+        error
+            (k, d) right-hand side of the contact equations.
+        balance
+            (p,) error of the balance.
+        D
+            (k, d, d) derivatives of the law's map.
+
+        Returns
+        -------
+        tuple
+            dr (k, d) and dlambda (p,).
+
+        Raises
+        ------
+        LinAlgError
+            If the system is singular.
+        """
         k, d = error.shape
+        # N, the unknowns of the contacts that are open or slip. The right-hand side of those that stick is error / rho.
         loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))
         N = (loose[:, None] * d + np.arange(d)).ravel()
         z = (error / rho[:, None]).ravel()
@@ -66,6 +100,7 @@ class Bonded:
         dr, multipliers = self.solve(z, balance)
         # So far every contact sticks. The others correct that by their displacements z_N.
         if len(N):
+            # With dr = (bonded dr) + G z_N their rows (I - D) dr + rho D z = error are a small dense system for z_N.
             G = self.inverse(N)
             keep = np.eye(d) - D[loose]
 

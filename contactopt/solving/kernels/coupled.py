@@ -27,6 +27,14 @@ from contactopt.problem.certificate import Moved
 from contactopt.problem.coupled import CoupledForm
 from contactopt.problem.stacked import Stacked, norm
 from contactopt.problem.threads import one_blas_thread
+from contactopt.solving.constants import (
+    COUPLED_FIRST,
+    COUPLED_LOOSEST,
+    COUPLED_TIGHTEST,
+    GIVEN_BALANCE,
+    SCHUR_MARGIN,
+    SCHUR_STEP,
+)
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.alart_curnier import (
     admissible,
@@ -40,10 +48,6 @@ from contactopt.solving.kernels.linearised import Linearised
 from contactopt.solving.kernels.semismooth import Equations
 from contactopt.solving.preconditioners import Preconditioner
 
-FIRST, LOOSEST, TIGHTEST = 0.1, 0.1, 1e-2  # accuracy of a step: the first two, and the bounds of the others
-INNER = 1e-2  # accuracy of the Schur complement of the model
-MARGIN = 1.5  # the model's Schur complement over that of a mean fit
-GIVEN = 1e-3  # accuracy of equilibrium under forces to start from
 MOST_ITERATIONS = 60  # conjugate gradient iterations towards it
 
 Known = tuple[np.ndarray, np.ndarray, Moved]  # reactions (k, dim), multipliers (p,) and Q r
@@ -70,7 +74,7 @@ class Coupled:
     def weights(self) -> Stacked:
         """Weights of the residuals of X, r and the balance: in units of the root of an energy, whatever the mesh."""
         r = np.repeat(self.equations.rho**-0.5, self.equations.q.shape[1])
-        return joined(self.form.diagonal() ** -0.5, r, np.ones(len(self.equations.s)))
+        return _joined(self.form.diagonal() ** -0.5, r, np.ones(len(self.equations.s)))
 
     def linearised(self, at: State) -> tuple[Stacked, Linearised]:
         """The right side of Newton's step there, in parts for X, r and the balance, and its contact equations."""
@@ -79,7 +83,7 @@ class Coupled:
         P, D = equations.project(at.r - equations.rho[:, None] * u)
         balance = equations.V.T @ at.r.ravel() + equations.s
         forces = self.form.unbalanced(at.X, at.r.ravel())
-        return joined(forces, (P - at.r).ravel(), -balance), Linearised(equations, D)
+        return _joined(forces, (P - at.r).ravel(), -balance), Linearised(equations, D)
 
     def size(self, right: Stacked) -> float:
         """The residual that belongs to a right side."""
@@ -92,20 +96,20 @@ class Coupled:
         model = (lambda x: self.P @ x) if self.P.model is None else self.P.model.matvec
 
         def product(x: Stacked) -> Stacked:
-            X, r, multipliers = parted(x)
+            X, r, multipliers = _parted(x)
             forces = form.stiffness(X) - form.pulled(r)
             moved = form.moved(X, r) + V @ multipliers
-            return joined(forces, linearised.rows(r, moved), V.T @ r)
+            return _joined(forces, linearised.rows(r, moved), V.T @ r)
 
         def precondition(x: Stacked) -> Stacked:
-            forces, error, balance = parted(x)
-            r, multipliers = linearised.solve(model, inverse, error, -balance, INNER)
-            return joined(form.approximate(forces + form.pulled(r)), r, multipliers)
+            forces, error, balance = _parted(x)
+            r, multipliers = linearised.solve(model, inverse, error, -balance, SCHUR_STEP)
+            return _joined(form.approximate(forces + form.pulled(r)), r, multipliers)
 
         change = flexible_gmres(product, precondition, right, self.weights, rtol)
         if not np.isfinite(norm(change)):
             return None
-        X, r, multipliers = parted(change)
+        X, r, multipliers = _parted(change)
         return State(at.X + X, at.r + r.reshape(at.r.shape), at.multipliers + multipliers)
 
     def judged(self, at: State, error: np.ndarray) -> Known:
@@ -130,7 +134,24 @@ def coupled_steps(
     preconditioner: str | None,
     start: tuple[np.ndarray, np.ndarray] | None,
 ) -> Iterator[tuple[Known, float]]:
-    """Newton's iterates with the residual of the equations that each step began with; ends where a step fails."""
+    """Iterate Newton's method on the contact equations and the equilibrium of the bodies at once.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem.
+    form
+        Its Q before condensation.
+    preconditioner
+        A name, as for `model_of`.
+    start
+        Forces (k, dim) and multipliers (p,) to start from; None: the bonded solution.
+
+    Yields
+    ------
+    tuple
+        An iterate, and the residual of the equations that its step began with. The iteration ends where a step fails.
+    """
     with one_blas_thread():
         several = len(problem.pairs) > 1
         P = model_of(problem, preconditioner, deflate=several)
@@ -142,16 +163,20 @@ def coupled_steps(
         with one_blas_thread():
             right, linearised = coupled.linearised(at)
             residual = coupled.size(right)
-            error = parted(right)[1].reshape(at.r.shape)
+            error = _parted(right)[1].reshape(at.r.shape)
             known = coupled.judged(at, admissible(problem, at.r, error) - at.r)
         yield known, residual
-        rtol = min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else FIRST
+        rtol = (
+            min(COUPLED_LOOSEST, max(COUPLED_TIGHTEST, 0.5 * (residual / last) ** 2))
+            if np.isfinite(last)
+            else COUPLED_FIRST
+        )
         with one_blas_thread():
             at, last = coupled.step(at, right, linearised, rtol), residual
 
 
 def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
-    """The bonded solution of contactopt.solving.kernels.alart_curnier.cold_start, to FIRST, or no force at all."""
+    """The bonded solution of contactopt.solving.kernels.alart_curnier.cold_start, to COUPLED_FIRST, or no force at all."""
     none = np.zeros(problem.q.shape)
     zero = State(coupled.form.pulled(none.ravel()), none, np.zeros(len(problem.s)))
     glued = glued_contacts(problem)
@@ -159,27 +184,58 @@ def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
         return zero
     glue = Coupled(glued_projection(coupled.equations, glued), coupled.form, coupled.P)
     right, linearised = glue.linearised(zero)
-    bonded = glue.step(zero, right, linearised, FIRST)
+    bonded = glue.step(zero, right, linearised, COUPLED_FIRST)
     if bonded is None or len(problem.s):
         return bonded or zero
     return min(zero, bonded, key=lambda state: coupled.size(coupled.linearised(state)[0]))
 
 
 def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
-    """P and its model, scaled so that the eigenvalues of P Q lie about 1 / MARGIN where a random force does most of its work.
+    """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / SCHUR_MARGIN where a random force does most of
+    its work.
 
     One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur complement that is rather
     too large than too small.
+
+    Parameters
+    ----------
+    P
+        The preconditioner, with its model of Q if it has one.
+    form
+        Q before condensation.
+
+    Returns
+    -------
+    Preconditioner
+        P and its model, scaled.
     """
+    # The mean eigenvalue of P Q, weighted with the work of a random force x: (Qx)' P (Qx) over x' Qx.
     x = np.random.default_rng(0).normal(size=P.shape[0])
     Qx = form.moved(form.approximate(form.pulled(x)), x)
-    factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / MARGIN, P.model
+    factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / SCHUR_MARGIN, P.model
     stiff = None if model is None else lambda y: model @ y / factor
     return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
 
 
-def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN) -> Stacked:
-    """Displacements X close to A^-1 T' r, by conjugate gradients with V-cycles."""
+def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN_BALANCE) -> Stacked:
+    """Compute displacements close to A^-1 T' r, by conjugate gradients with V-cycles.
+
+    Parameters
+    ----------
+    form
+        Q before condensation.
+    r
+        (k, dim) contact forces.
+    rtol
+        Relative accuracy in the energy norm.
+
+    Returns
+    -------
+    Stacked
+        Displacements X of the bodies.
+    """
+    # Conjugate gradients on A X = T' r with B, one V-cycle, as preconditioner; `size` is the energy residual' B
+    # residual.
     residual = form.pulled(r.ravel())
     X, size, goal = 0.0 * residual, 1.0, 0.0
     p = X
@@ -198,12 +254,12 @@ def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN) -> Sta
     return X
 
 
-def joined(X: Stacked, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
+def _joined(X: Stacked, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
     """One vector of the parts of X, of r (k d,) and of multipliers (p,)."""
     return Stacked((*X.parts, r, multipliers))
 
 
-def parted(x: Stacked) -> tuple[Stacked, np.ndarray, np.ndarray]:
+def _parted(x: Stacked) -> tuple[Stacked, np.ndarray, np.ndarray]:
     """X, r and the multipliers of a joined vector."""
     *X, r, multipliers = x.parts
     return Stacked(tuple(X)), r, multipliers

@@ -24,14 +24,24 @@ Act = Callable[[Any], Any]
 
 
 def flexible_gmres(product: Act, inverse: Act, right: Vector, weights: Vector, rtol: float) -> Any:
-    """x with |W (right - A x)| <= rtol |W right|, W = diag(weights), or the best after RUNS runs of RESTART iterations.
+    """Solve A x = b by GMRES with a preconditioner that may change, to |W (b - A x)| <= rtol |W b| with W =
+    diag(weights).
 
     Parameters
     ----------
-    product : x -> A x
-    inverse : r -> an approximation of A^-1 r
-    right, weights : right side, and positive weights of its entries; both are arrays (n,) or both are Stacked
-    rtol : relative size of the residual
+    product
+        x -> A x.
+    inverse
+        r -> an approximation of A^-1 r.
+    right, weights
+        Right-hand side b, and positive weights of its entries; both are arrays (n,) or both are Stacked.
+    rtol
+        Relative size of the residual.
+
+    Returns
+    -------
+    ndarray or Stacked
+        The solution x, or the best after RUNS runs of RESTART iterations.
     """
     x, residual = 0.0 * right, right
     goal = rtol * norm(weights * right)

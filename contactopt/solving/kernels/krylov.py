@@ -22,6 +22,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.operators import loosened
+from contactopt.solving.constants import MODEL_PRODUCTS, MODEL_STEP, PRODUCT_SHARE
 from contactopt.solving.kernels.linearised import CYCLES, RESTART, Linearised
 from contactopt.solving.kernels.semismooth import Equations
 from contactopt.solving.notes import note
@@ -30,24 +31,38 @@ from contactopt.solving.preconditioners import Preconditioner, deflated, precond
 logger = logging.getLogger(__name__)
 
 FLAT = 1e-8  # eigenvalues of D below this are zero
-PRODUCTS = 0.05  # accuracy of products, over that of the step
-INNER = 1e-3  # and of the model's GMRES, which costs next to nothing
-MODEL = 1e-4  # accuracy of the products that make the model
 
 Step = tuple[np.ndarray, np.ndarray]  # dr (k, d), dlambda (p,)
 
 
 def model_of(problem: InterfaceProblem, name: str | None = None, deflate: bool = True) -> Preconditioner:
-    """The preconditioner of that name, with the smooth motions deflated if asked for; 'none': the identity.
+    """Make the preconditioner of a problem, with the smooth motions deflated if asked for.
 
-    None: `neumann` where the contacts lie on a grid, `laplacian` on other surfaces whose cells are known, else the identity,
-    with a note that says why.
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    name
+        A name in PRECONDITIONERS, or 'none' for the identity. By default `neumann` where the contacts lie on a grid,
+        `laplacian` on other surfaces whose cells are known, else the identity, with a note that says why.
+    deflate
+        Whether the smooth motions of the bodies are solved for exactly, which costs a few products with Q.
+
+    Returns
+    -------
+    Preconditioner
+        An approximate inverse of Q, on arrays (k dim,).
+
+    Raises
+    ------
+    InputError
+        If the preconditioner that was named is unknown or does not fit the contacts.
     """
     missing: list[str] = []
     for choice in ("neumann", "laplacian") if name is None else (name,) * (name != "none"):
         try:
             P = preconditioner(problem, choice)
-            return deflated(P, loosened(problem.Q, MODEL), smooth_motions(problem)) if deflate else P
+            return deflated(P, loosened(problem.Q, MODEL_PRODUCTS), smooth_motions(problem)) if deflate else P
         except InputError as error:
             if name is not None:
                 raise
@@ -60,7 +75,28 @@ def model_of(problem: InterfaceProblem, name: str | None = None, deflate: bool =
 def krylov_step(
     equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
 ) -> Step | None:
-    """dr (k, d), dlambda (p,) to that relative accuracy; None if the iteration does not get anywhere."""
+    """Solve for a Newton step from products with Q alone.
+
+    Parameters
+    ----------
+    equations
+        The equations of contact and friction at k contacts in d components.
+    P
+        The preconditioner.
+    error
+        (k, d) right-hand side of the contact equations.
+    balance
+        (p,) error of the balance.
+    D
+        (k, d, d) derivatives of the law's map.
+    rtol
+        Relative accuracy of the step.
+
+    Returns
+    -------
+    tuple or None
+        dr (k, d) and dlambda (p,); None if the iteration does not get anywhere.
+    """
     symmetric = np.array_equal(D, D.transpose(0, 2, 1))
     solve = _symmetric_step if symmetric else _unsymmetric_step
     dr, multipliers = solve(equations, P, error, balance, D, rtol)
@@ -72,7 +108,7 @@ def krylov_step(
 def _symmetric_step(
     equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
 ) -> Step:
-    Q, V = loosened(equations.Q, PRODUCTS * rtol), equations.V
+    Q, V = loosened(equations.Q, PRODUCT_SHARE * rtol), equations.V
     # The unknowns alpha are the amounts of the directions U in which a contact may still change its force.
     U, delta, rho = _directions(D, equations.rho)
     # B of the module's head; a proximal subproblem adds its weight to Q.
@@ -118,6 +154,7 @@ def _symmetric_step(
 def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
     """U (k d, m) with the eigenvectors of all D whose eigenvalues delta (m,) are positive, and rho (m,) of each."""
     k, d = D.shape[:2]
+    # The eigenvectors of each contact's D become columns of U, which touch the rows of that contact only.
     values, vectors = np.linalg.eigh(D)
     contact, which = np.nonzero(values > FLAT)
     columns = vectors[contact, :, which]  # (m, d)
@@ -131,7 +168,7 @@ def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarr
 def _unsymmetric_step(
     equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
 ) -> Step:
-    Q, linearised = loosened(equations.Q, PRODUCTS * rtol), Linearised(equations, D)
-    inverse = linearised.inverse(P, INNER * rtol)
+    Q, linearised = loosened(equations.Q, PRODUCT_SHARE * rtol), Linearised(equations, D)
+    inverse = linearised.inverse(P, MODEL_STEP * rtol)
     dr, multipliers = linearised.solve(lambda x: Q @ x, inverse, error.ravel(), balance, rtol)
     return dr.reshape(error.shape), multipliers

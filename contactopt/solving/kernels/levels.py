@@ -22,12 +22,11 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.convolution import Convolution, Kernel, backward, forward
 from contactopt.problem.counter import Counter
 from contactopt.problem.laws import Law
+from contactopt.solving.constants import COARSEST, FIRST_SHIFT, LEAST_DETERMINANT, LEAST_SYMBOL, SHIFT_RATIO
 from contactopt.solving.deadline import check_time
 
 RESTART, CYCLES = 40, 3  # of GMRES
 ITERATIONS = 100  # of PCG
-COARSEST = 12  # contacts a side
-FIRST, RATIO = 0.5, 32.0  # of the shifts of `shift_shares`: where they begin to grow, and by how much
 
 Point = tuple[np.ndarray, np.ndarray]  # reactions (c, k), multipliers (p,)
 
@@ -175,7 +174,7 @@ class Level:
             low = symbol.ravel()[1:].min() if self.periodic else 0.0
             if self.periodic:
                 symbol.flat[0] = 2 * symbol.max()
-            return np.maximum(symbol, max(low, 1e-3 * float(np.median(symbol)))) + shift
+            return np.maximum(symbol, max(low, LEAST_SYMBOL * float(np.median(symbol)))) + shift
 
         if not components:
             return {}
@@ -183,7 +182,7 @@ class Level:
         if len(components) == 1:
             return {(components[0], components[0]): (1 / first).astype(np.float32)}
         second, mixed = positive(symbols[2, 2]), symbols[1, 2][every] if (1, 2) in symbols else 0.0 * first
-        determinant = np.maximum(first * second - mixed**2, 0.1 * first * second)
+        determinant = np.maximum(first * second - mixed**2, LEAST_DETERMINANT * first * second)
         inverse = {(1, 1): second / determinant, (2, 2): first / determinant, (1, 2): -mixed / determinant}
         return {pair: symbol.astype(np.float32) for pair, symbol in inverse.items()}
 
@@ -228,7 +227,22 @@ class Evaluation:
 
 
 def step(level: Level, at: Evaluation, rtol: float) -> tuple[Point, int]:
-    """dr (c, k), dlambda (p,) of a Newton step to that relative accuracy, and the iterations that it took."""
+    """Solve for a Newton step on one grid.
+
+    Parameters
+    ----------
+    level
+        The problem on its grid, of c components and k contacts.
+    at
+        The equations at the present point.
+    rtol
+        Relative accuracy of the step.
+
+    Returns
+    -------
+    tuple
+        The step, dr (c, k) and dlambda (p,), and the number of iterations that it took.
+    """
     known = at.error.copy()
     known[:, at.closed] = 0.0
     moved = level.product(known, single=True)[:, at.closed] if np.any(known) else np.zeros((len(known), len(at.closed)))
@@ -258,6 +272,7 @@ def _symmetric(
     """Q dr + V dlambda = error / rho - Q known, V' dr = balance on the closed contacts, by projected PCG."""
     c, m = moved.shape
     act = _act(level, at.closed, at.error.shape)
+    # W holds the columns of the balance; N is the rough inverse, normal and tangential components by themselves.
     right = (at.error[:, at.closed] / level.rho - moved).ravel()
     W = V.reshape(c * m, -1)
     normal, tangential = (level.components[:1], level.components[1:])
@@ -269,15 +284,18 @@ def _symmetric(
             out.append(level.rough_solve(parts[1:], at.closed, tangential))
         return np.concatenate(out).astype(float).ravel()
 
+    # Y = N W and K = (W'N W)^-1. The start x = Y K balance meets the balance W'x; all corrections keep it.
     Y = np.stack([near(w) for w in W.T], axis=1) if W.shape[1] else W
     K = np.linalg.pinv(W.T @ Y)
     x = Y @ (K @ balance)
     residual = right - (act(x.reshape(c, m)).ravel() if np.any(x) else 0.0)
 
     def projected(residual: np.ndarray) -> np.ndarray:
+        # I - Y K W' takes the part out of N residual that would change the balance.
         z = near(residual)
         return np.asarray(z - Y @ (K @ (W.T @ z)))
 
+    # Conjugate gradients among the x that meet the balance, until residual' N residual has fallen enough.
     z = projected(residual)
     gamma = float(residual @ z)
     aim, p, count = rtol**2 * abs(gamma), z, 0
@@ -289,6 +307,7 @@ def _symmetric(
         z = projected(residual)
         new = float(residual @ z)
         p, gamma, count = z + (new / gamma) * p, new, count + 1
+    # What is left of the residual is W lambda; least squares in the norm of N give lambda.
     lam = K @ (Y.T @ residual) if W.shape[1] else balance
     return x.reshape(c, m), np.asarray(lam), count
 
@@ -346,7 +365,7 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
     values, vectors = np.linalg.eigh(D[:, 1:, 1:])
     values = np.clip(values, 1e-12, 1.0)
     pressed = D[:, 0, 0] > 0
-    shifts, shares = shift_shares((1 - values) / values, rho * level.largest)
+    shifts, shares = _shift_shares((1 - values) / values, rho * level.largest)
 
     def turned(weights: np.ndarray) -> np.ndarray:
         return np.einsum("kab,kb,kcb->kac", vectors, weights, vectors)
@@ -383,12 +402,12 @@ def _rough_inverse(level: Level, at: Evaluation, V: np.ndarray) -> Callable[[np.
     return solve
 
 
-def shift_shares(sigma: np.ndarray, largest: float) -> tuple[np.ndarray, list[np.ndarray]]:
+def _shift_shares(sigma: np.ndarray, largest: float) -> tuple[np.ndarray, list[np.ndarray]]:
     """Shifts from 0 to beyond `largest`, and the share (k, j) that each sigma (k, j) has in each of them.
 
-    The shares are hat functions of log(FIRST + sigma); those of sigma beyond the last shift sum to less than one.
+    The shares are hat functions of log(FIRST_SHIFT + sigma); those of sigma beyond the last shift sum to less than one.
     """
-    count = int(np.ceil(np.log(1 + largest / FIRST) / np.log(RATIO)))
-    place = np.log1p(sigma / FIRST) / np.log(RATIO)
+    count = int(np.ceil(np.log(1 + largest / FIRST_SHIFT) / np.log(SHIFT_RATIO)))
+    place = np.log1p(sigma / FIRST_SHIFT) / np.log(SHIFT_RATIO)
     shares = [np.maximum(0.0, 1 - np.abs(place - j)) for j in range(count + 1)]
-    return FIRST * (RATIO ** np.arange(count + 1) - 1.0), shares
+    return FIRST_SHIFT * (SHIFT_RATIO ** np.arange(count + 1) - 1.0), shares

@@ -14,11 +14,11 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from contactopt.solving.constants import SLIPPING
 from contactopt.solving.kernels.semismooth import Equations
 from contactopt.solving.preconditioners import Preconditioner
 
 RESTART, CYCLES = 60, 3  # of GMRES
-SLIPPING = 0.5  # diagonal entries of D below this count as zero where only a rough inverse is asked for
 
 Act = Callable[[np.ndarray], np.ndarray]
 
@@ -94,11 +94,13 @@ class Linearised:
             y[inside] = (P @ full)[unknowns]
             return y
 
+        # The border of the balance: K is the inverse of V' N (rho V), the Schur complement for the rough inverse N.
         border = rho[:, None] * V * inside[:, None]
         Y = np.stack([apply(v) for v in border.T], axis=1) if p else V
         K = np.linalg.pinv(V.T @ Y)
 
         def solve(x: np.ndarray) -> np.ndarray:
+            # First without multipliers, then the multipliers that restore the balance, then their share of dr.
             y = apply(x[:n])
             multipliers = K @ (V.T @ y - x[n:])
             return np.concatenate([y - Y @ multipliers, multipliers])

@@ -19,14 +19,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.errors import InputError
+from contactopt.solving.constants import (
+    EIGENVALUE_MARGIN,
+    FINEST_SHARE,
+    ROUND_SHARE,
+    ROWS_FALL,
+    ROWS_SHARE,
+    SINGLE_ACCURACY,
+    SINGLE_PROGRESS,
+    SINGLE_STEPS,
+    STIFFER,
+)
 from contactopt.solving.deadline import check_time
 
-MARGIN = 1.1  # on the estimate of the largest eigenvalue, which power steps approach from below
-SINGLE = 1e-4  # relative accuracy asked of one round in single precision
-ROUND = 300  # steps of one round
-FALL = 0.3  # factor by which the error of the rows should fall in one step of the multipliers
-STIFFEST = 1e6  # largest penalty, relative to P's largest eigenvalue
-SLOW = 0.1  # a round that reduces the residual by less than this is the last one in single precision
+LENGTH = 1.9  # of gradient steps, over 1 / the largest eigenvalue; they converge below 2 (Dostal 2009, chapter 5)
+STIFFEST = 1e6  # largest penalty, relative to P's largest eigenvalue; beyond it half of the digits are lost
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +47,20 @@ class BoxResult:
 
 
 def largest_eigenvalue(P: np.ndarray, steps: int = 10) -> float:
-    """Estimate from below of the largest eigenvalue of P (n, n), an array or sparse, symmetric positive semidefinite, by power steps."""
+    """Estimate the largest eigenvalue of a symmetric positive semidefinite matrix from below, by power steps.
+
+    Parameters
+    ----------
+    P
+        (n, n) an array or sparse.
+    steps
+        Number of products with P.
+
+    Returns
+    -------
+    float
+        The estimate; 0 for an empty or a zero matrix.
+    """
     n = P.shape[0]
     v = (1 + 0.1 * np.cos(1.0 + np.arange(n))).astype(P.dtype)
     value = 0.0
@@ -54,7 +74,18 @@ def largest_eigenvalue(P: np.ndarray, steps: int = 10) -> float:
 
 
 def projected_gradient(x: np.ndarray, g: np.ndarray, low: np.ndarray) -> np.ndarray:
-    """Gradient g where x is free, its negative part where x is at its bound; zero exactly at the solution."""
+    """Compute the projected gradient, which is zero exactly at the solution.
+
+    Parameters
+    ----------
+    x, g, low
+        (n,) point, gradient there, and lower bounds.
+
+    Returns
+    -------
+    ndarray
+        (n,) the gradient where x is free, its negative part where x is at its bound.
+    """
     return np.where(x > low, g, np.minimum(g, 0))
 
 
@@ -96,7 +127,7 @@ def mprgp(
 
 
 def _bound(P: np.ndarray) -> float:
-    return MARGIN * largest_eigenvalue(P) or 1.0
+    return EIGENVALUE_MARGIN * largest_eigenvalue(P) or 1.0
 
 
 def _check(P: np.ndarray, c: np.ndarray, low: np.ndarray) -> None:
@@ -113,7 +144,7 @@ def _descend(
     P: np.ndarray, c: np.ndarray, low: np.ndarray, x: np.ndarray, target: float, limit: int, largest: float
 ) -> tuple[np.ndarray, int, bool]:
     """MPRGP from the feasible x: the last x, the steps taken, whether |projected gradient| <= target."""
-    length = 1.9 / largest
+    length = LENGTH / largest
     g = P @ x + c
     p = None  # direction of the conjugate gradients; None: start afresh from the free gradient
     for step in range(limit):
@@ -164,11 +195,28 @@ def box_qp(
     tol: float = 1e-10,
     max_iterations: int = 10_000,
 ) -> BoxResult:
-    """The same problem as `mprgp`, in less time where P does not fit the processor's cache (reports/dense_speed).
+    """Solve the same problem as `mprgp`, in less time where P does not fit the processor's cache (reports/dense_speed).
 
     Iterative refinement: the correction d of x minimises d'Pd/2 + (P x + c)'d, d >= low - x, in single precision to a
-    few digits, scaled so that no digit is lost; its gradient is taken anew in double precision. Ends in double
-    precision if P is too ill-conditioned for that. P must be an array of float64.
+    few digits, scaled so that no digit is lost; its gradient is taken anew in double precision. It ends in double
+    precision if P is too ill-conditioned for that.
+
+    Parameters
+    ----------
+    P
+        (n, n) symmetric positive semidefinite array of float64.
+    c, low, start, tol, max_iterations
+        As for `mprgp`.
+
+    Returns
+    -------
+    BoxResult
+        The solution, without multipliers.
+
+    Raises
+    ------
+    InputError
+        On shapes that do not fit.
     """
     _check(P, c, low)
     x, target = _start(c, low, start), tol * float(np.linalg.norm(c))
@@ -180,7 +228,7 @@ def box_qp(
         size = float(np.linalg.norm(projected_gradient(x, g, low)))
         if size <= target:
             return BoxResult(x, np.zeros(0), total, True)
-        if size > SLOW * residual:
+        if size > SINGLE_PROGRESS * residual:
             break
         residual = size
         bound = (low - x) / size
@@ -189,8 +237,8 @@ def box_qp(
             (g / size).astype(np.float32),
             bound.astype(np.float32),
             np.zeros(len(c), np.float32),
-            max(SINGLE, 0.3 * target / size),
-            ROUND,
+            max(SINGLE_ACCURACY, ROUND_SHARE * target / size),
+            SINGLE_STEPS,
             largest,
         )
         total += steps
@@ -248,7 +296,7 @@ def smalbe(
     while total < max_iterations:
         linear = c + A.T @ (y - penalty * b)
         target = tol * float(np.linalg.norm(c + A.T @ y))
-        wanted = max(0.1 * min(penalty * error, before), 1e-3 * target)
+        wanted = max(ROWS_SHARE * min(penalty * error, before), FINEST_SHARE * target)
         x, steps, met = _descend(augmented, linear, low, x, wanted, max_iterations - total, largest + penalty)
         total += max(steps, 1)
         y = y + penalty * (A @ x - b)
@@ -256,7 +304,7 @@ def smalbe(
         if met and wanted <= target and error <= enough:
             return BoxResult(x, np.linalg.solve(triangle, y), total, True)
         before = wanted
-        if error > max(FALL * last, enough) and penalty < STIFFEST * largest:
-            penalty *= 4
+        if error > max(ROWS_FALL * last, enough) and penalty < STIFFEST * largest:
+            penalty *= STIFFER
             augmented = P + penalty * (A.T @ A)
     return BoxResult(x, np.linalg.solve(triangle, y), total, False)

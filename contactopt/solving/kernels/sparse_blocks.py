@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from contactopt.problem.operators import Interface
@@ -21,7 +23,20 @@ from contactopt.solving.constants import FULL, SMALL
 
 PIVOT = 0.01  # a diagonal entry this much smaller than the largest of its column is still a pivot
 
-Solver = Callable[[np.ndarray], np.ndarray]  # right-hand sides (m, j) -> x (m, j)
+
+@dataclass(frozen=True)
+class Solver:
+    """A factorised block system.
+
+    apply  right-hand sides (m, j) -> x (m, j)
+    sign   -> sign of the determinant, 1 or -1
+    """
+
+    apply: Callable[[np.ndarray], np.ndarray]
+    sign: Callable[[], float]
+
+    def __call__(self, right: np.ndarray) -> np.ndarray:
+        return self.apply(right)
 
 
 class DenseBlocks:
@@ -45,7 +60,13 @@ class DenseBlocks:
                 factors = la.lu_factor(A if kept.all() else A[np.ix_(kept, kept)], overwrite_a=True, check_finite=False)
             except (la.LinAlgError, ValueError):
                 return None
-        return lambda right: np.asarray(la.lu_solve(factors, right, check_finite=False))
+        lu, swapped = factors
+
+        def sign() -> float:
+            swaps = np.count_nonzero(swapped != np.arange(len(lu)))
+            return float(np.prod(np.sign(np.diagonal(lu))) * (-1.0) ** swaps)
+
+        return Solver(lambda right: np.asarray(la.lu_solve(factors, right, check_finite=False)), sign)
 
 
 class SparseBlocks:
@@ -58,6 +79,8 @@ class SparseBlocks:
 
     def __init__(self, Q: sp.csr_array, d: int):
         self.Q, self.d, self.k = Q, d, Q.shape[0] // d
+        # Every entry belongs to the block of its row's and its column's contact. Blocks are numbered row by row, and
+        # every diagonal block is there, because something will be added to it.
         entries = sp.coo_array(Q)
         i, j = (index.astype(np.int64) for index in entries.coords)
         own = np.arange(self.k)
@@ -72,9 +95,11 @@ class SparseBlocks:
     def _arranged(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """The unknowns in an order of elimination of least degree, and the entries by compressed columns of that order."""
         d, n = self.d, self.d * self.k
+        # SuperLU finds the order on a matrix of the same pattern with so large a diagonal that nothing is pivoted.
         size = float(np.abs(self.Q.data).max(initial=0.0)) or 1.0
         safe = sp.csc_array(abs(self.Q) + sp.diags_array(np.full(n, 2 * size * self.k)))  # pivots are on the diagonal
         place = splu(safe, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).perm_c
+        # Row and column of every entry of every block in that order, sorted as compressed columns want them.
         local = np.arange(d)
         row = place[np.broadcast_to((self.rows[:, None] * d + local)[:, :, None], self.blocks.shape)].ravel()
         column = place[np.broadcast_to((self.columns[:, None] * d + local)[:, None, :], self.blocks.shape)].ravel()
@@ -85,6 +110,7 @@ class SparseBlocks:
         """As DenseBlocks.factor."""
         blocks = self.blocks.copy() if left is None else left[self.rows] @ self.blocks
         blocks[self.home] += added
+        # Take the entries by columns, and leave out the unknowns that are not kept.
         values, row, column = blocks.ravel()[self.order], self.row, self.column
         stays = kept[self.unknown]  # in the order of elimination
         m = int(stays.sum())
@@ -105,14 +131,38 @@ class SparseBlocks:
             x[index] = factors.solve(np.ascontiguousarray(right[index]))
             return x
 
-        return solve
+        def sign() -> float:
+            pivots = float(np.prod(np.sign(factors.U.diagonal())))
+            return pivots * _parity(factors.perm_r) * _parity(factors.perm_c)
+
+        return Solver(solve, sign)
 
 
 Blocks = DenseBlocks | SparseBlocks
 
 
+def _parity(order: np.ndarray) -> int:
+    """1 for an even permutation, -1 for an odd one: by its cycles."""
+    n = len(order)
+    cycles = connected_components(sp.csr_array((np.ones(n), (np.arange(n), order)), shape=(n, n)))[0]
+    return -1 if (n - cycles) % 2 else 1
+
+
 def block_matrix(Q: Interface, d: int) -> Blocks:
-    """Q for block systems: sparse where that is faster than LAPACK on an array."""
+    """Prepare Q for block systems: sparse where that is faster than LAPACK on an array.
+
+    Parameters
+    ----------
+    Q
+        (n, n) an array or sparse.
+    d
+        Number of components of a contact.
+
+    Returns
+    -------
+    Blocks
+        The matrix, which solves with other diagonal blocks added.
+    """
     if not sp.issparse(Q):
         return DenseBlocks(Q, d)
     n = Q.shape[0]
@@ -122,7 +172,24 @@ def block_matrix(Q: Interface, d: int) -> Blocks:
 def bordered(
     solve: Solver, right: np.ndarray, V: np.ndarray, left: np.ndarray, balance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """x (m,), lambda (p,) with A x + left lambda = right and V' x = balance; `solve` solves with A. None if not finite."""
+    """Solve A x + left lambda = right and V' x = balance, given a solver with A.
+
+    Parameters
+    ----------
+    solve
+        Solves with A (m, m) for right-hand sides (m, j).
+    right
+        (m,) right-hand side.
+    V, left
+        (m, p) columns of the border.
+    balance
+        (p,) right-hand side of the border.
+
+    Returns
+    -------
+    tuple or None
+        x (m,) and lambda (p,), the latter by least squares where it is not unique. None if a number is not finite.
+    """
     p = len(balance)
     x = solve(np.column_stack([right, left]) if p else right[:, None])
     if not np.all(np.isfinite(x)):

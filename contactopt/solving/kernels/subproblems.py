@@ -14,14 +14,13 @@ from contactopt.errors import BackendError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
 from contactopt.problem.operators import diagonal
+from contactopt.solving.constants import ACTIVE_SETS, SUCCESS, WEIGHT_FALL, WEIGHT_RISE
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.krylov import krylov_step
 from contactopt.solving.kernels.semismooth import Equations, Projection
 from contactopt.solving.preconditioners import Preconditioner
 
-STEPS = 15  # active sets tried in a row
 LOOPS = 60  # proximal steps
-SUCCESS = 1e-2  # residual of a proximal step, over the one it began with, at which it is taken
 EXACT = 1e-10  # residual relative to the size of the forces at which a subproblem is solved
 USABLE = 1e-5  # and above which there is no answer
 
@@ -54,10 +53,10 @@ class KrylovSubproblem:
                 return point
             left, new = self._active_sets(self._equations(r, multipliers, point[0], weight), *point)
             if left <= SUCCESS * residual:
-                point, weight = new, weight / 4
+                point, weight = new, weight / WEIGHT_FALL
                 residual = equations.evaluate(*point)[0]
             else:
-                weight *= 8
+                weight *= WEIGHT_RISE
         if residual > USABLE * size:
             kind = "normal" if self.normal else "tangential"
             raise BackendError(f"backend 'pcg' misses the {kind} problem by {residual / size:.1e}")
@@ -70,9 +69,9 @@ class KrylovSubproblem:
         return Equations(problem.Q, q, problem.V[:, own], problem.s[own], self._projection(r), rho, center, weight)
 
     def _active_sets(self, equations: Equations, r: np.ndarray, lam: np.ndarray) -> tuple[float, Iterate]:
-        """The best of STEPS Newton iterates, and its residual."""
+        """The best of ACTIVE_SETS Newton iterates, and its residual."""
         best, point, last = np.inf, (r, lam), np.inf
-        for _ in range(STEPS):
+        for _ in range(ACTIVE_SETS):
             check_time()
             residual, error, balance, D = equations.evaluate(r, lam)
             if residual < best:

@@ -28,12 +28,41 @@ Known = tuple[np.ndarray, np.ndarray, Moved]  # the same, and Q r
 
 
 class Method(Protocol):
-    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]: ...
+    """What every method offers, as the head of this module says."""
+
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate | Known]:
+        """Iterate on a dimensionless problem. The driver decides when to stop.
+
+        Parameters
+        ----------
+        problem
+            The dimensionless interface problem.
+        start
+            Reactions (k, dim) and multipliers (p,) to start from; None: a cold start.
+
+        Yields
+        ------
+        tuple
+            Reactions (k, dim), multipliers (p,) and, where the method knows it, Q r as a Moved.
+        """
 
     def backends(self, dim: int) -> tuple[str, str]:
-        """Names of its normal and tangential backend in `dim` dimensions, NATIVE where it needs none.
+        """Name the backends that the method needs.
 
-        Raises InputError if one cannot be used.
+        Parameters
+        ----------
+        dim
+            Number of components of a contact, 2 or 3.
+
+        Returns
+        -------
+        tuple
+            The normal and the tangential backend, NATIVE where it needs none.
+
+        Raises
+        ------
+        InputError
+            If one cannot be used.
         """
 
 
@@ -84,23 +113,76 @@ NATIVE = "native"  # in place of a backend's name: our own linear algebra
 
 
 def solves(method: Any, law: Law) -> bool:
-    """Whether a method solves problems of that law; one that says nothing about it solves all."""
+    """Say whether a method solves problems of a law. A method that says nothing about it solves all.
+
+    Parameters
+    ----------
+    method
+        The method, an object with `iterate`.
+    law
+        The law of a problem.
+
+    Returns
+    -------
+    bool
+        The answer of the method's own `solves`, if it has one.
+    """
     predicate = getattr(method, "solves", None)
     return predicate is None or bool(predicate(law))
 
 
 def solvers_of(law: Law) -> list[str]:
-    """Names of the methods that solve problems of that law."""
+    """List the methods that solve problems of a law.
+
+    Parameters
+    ----------
+    law
+        The law of a problem.
+
+    Returns
+    -------
+    list
+        Names in METHODS, in their order.
+    """
     return [name for name in METHODS if solves(find_method(name), law)]
 
 
 def default_method(settings: Mapping[str, Any]) -> str:
-    """`auto`, or `alternating` where the settings name a backend."""
+    """Choose the method where none is named: `auto`, or `alternating` where the settings name a backend.
+
+    Parameters
+    ----------
+    settings
+        The settings of the method.
+
+    Returns
+    -------
+    str
+        A name in METHODS.
+    """
     return "alternating" if settings.get("normal") or settings.get("tangential") else "auto"
 
 
 def find_method(name: str, **settings: Any) -> Method:
-    """The method of that name with its settings; InputError if there is no such method or setting."""
+    """Make the method of a name with its settings.
+
+    Parameters
+    ----------
+    name
+        A name in METHODS.
+    settings
+        The fields of the method that are not left as they are.
+
+    Returns
+    -------
+    Method
+        The method.
+
+    Raises
+    ------
+    InputError
+        If there is no such method or setting, or a setting has a wrong value.
+    """
     if name not in METHODS:
         raise InputError(f"unknown method {name!r}; choose from {', '.join(METHODS)}.")
     module, cls, _ = METHODS[name]

@@ -26,14 +26,11 @@ from scipy.sparse.linalg import splu
 
 from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
+from contactopt.solving.constants import FIRST_BALANCING, LEAST_CHANGE, MOST_CHANGE
 from contactopt.solving.methods import NATIVE, Iterate
 
 OVER = 1.6  # over-relaxation, between 1.5 and 1.8 in the literature
-FIRST = 10  # iteration of the first balancing of rho
 Inverse = Callable[[np.ndarray], np.ndarray]  # x (n,) or (n, j) -> (Q + rho I)^-1 x
-
-CHANGE = 10.0  # largest factor by which rho changes at once
-WORTH = 2.0  # smallest factor that is worth a factorisation
 
 
 @dataclass(frozen=True)
@@ -58,28 +55,33 @@ class ADMM:
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         z, multipliers = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        rho, count, check = self.rho, 0, FIRST
+        rho, count, check = self.rho, 0, FIRST_BALANCING
         system = Balanced(problem, rho)
         x = np.zeros_like(z) if start is None else -problem.displacements(z, multipliers) / rho
         law = problem.law
         if start is not None:
             x[:, 0] -= law.opening(x[:, 1:])
         while True:
+            # r minimises the quadratic program with the weight rho on |r - z + x|^2, under the balance.
             right = rho * (z - x) - problem.q
             right[:, 0] -= rho * law.opening(x[:, 1:])
             r, multipliers = system.solve(right, problem.s)
+            # z is the nearest point of the set of forces; over-relaxation mixes r with the old z.
             relaxed, old = OVER * r + (1 - OVER) * z, z
             z = law.nearest(relaxed + x, (relaxed + x)[:, 0])
+            # x sums up the errors of r = z. At the solution -rho x is the velocity u + g n.
             x = x + relaxed - z
             yield z, multipliers
             count += 1
             if count == check:
                 check *= 2
+                # The larger error says which way rho must go: a larger rho lets r = z fall faster, a smaller one the
+                # velocity.
                 primal = float(np.linalg.norm(r - z)) / max(float(np.linalg.norm(z)), 1e-300)
                 moved = (problem.Q @ z.ravel(), problem.q, rho * x)  # what the velocity is the difference of
                 dual = rho * float(np.linalg.norm(z - old)) / max(*(float(np.linalg.norm(m)) for m in moved), 1e-300)
-                factor = float(np.clip(np.sqrt(max(primal, 1e-300) / max(dual, 1e-300)), 1 / CHANGE, CHANGE))
-                if not 1 / WORTH < factor < WORTH:
+                factor = float(np.clip(np.sqrt(max(primal, 1e-300) / max(dual, 1e-300)), 1 / MOST_CHANGE, MOST_CHANGE))
+                if not 1 / LEAST_CHANGE < factor < LEAST_CHANGE:
                     rho, x = rho * factor, x / factor
                     system = Balanced(problem, rho)
 

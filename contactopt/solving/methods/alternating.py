@@ -72,6 +72,18 @@ class Alternating:
         return find(self.normal, QP).name, find(tangential, QP if dim == 2 else CONIC).name
 
     def solves(self, law: Law) -> bool:
+        """Say whether the method solves problems of a law.
+
+        Parameters
+        ----------
+        law
+            The law of a problem.
+
+        Returns
+        -------
+        bool
+            True for laws that bound tangential forces and under which slip does not open the gap.
+        """
         return law.bounded and not law.dilatant
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:

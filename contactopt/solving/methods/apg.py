@@ -23,10 +23,10 @@ import numpy as np
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
 from contactopt.problem.laws import Projected
-from contactopt.solving.constants import SHARPER, SHARPEST
+from contactopt.solving.constants import EIGENVALUE_MARGIN, SHARPER, SHARPEST
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.balance import project_balanced
-from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue
+from contactopt.solving.kernels.mprgp import largest_eigenvalue
 from contactopt.solving.methods import NATIVE, Iterate
 
 INNER = 2000  # products with Q in one subproblem
@@ -44,7 +44,7 @@ class APG:
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        step = 1 / (MARGIN * largest_eigenvalue(problem.Q) or 1.0)
+        step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(problem.Q) or 1.0)
         law, target = problem.law, 1e-3
         while True:
             q, r_n = problem.q.copy(), r[:, 0]
@@ -55,13 +55,13 @@ class APG:
 
             prox = lambda y, lam, P=project: project_balanced(P, y, problem.V, problem.s, step, lam)  # noqa: E731
             gradient = lambda y, q=q: (problem.Q @ y.ravel()).reshape(q.shape) + q  # noqa: E731
-            new, lam = accelerate(gradient, prox, r, lam, step, target * max(1.0, float(np.linalg.norm(r))))
+            new, lam = _accelerate(gradient, prox, r, lam, step, target * max(1.0, float(np.linalg.norm(r))))
             change = float(np.linalg.norm(new - r)) / max(1.0, float(np.linalg.norm(new)))
             r, target = new, max(SHARPER * min(change, 1e2 * target), SHARPEST)
             yield r, lam
 
 
-def accelerate(
+def _accelerate(
     gradient: Callable[[np.ndarray], np.ndarray],
     prox: Callable[[np.ndarray, np.ndarray], Iterate],
     r: np.ndarray,
@@ -89,14 +89,31 @@ def accelerate(
 def disc_qp(
     Q: np.ndarray, c: np.ndarray, radius: np.ndarray, start: np.ndarray | None = None, tol: float = 1e-10
 ) -> tuple[np.ndarray, bool]:
-    """min t'Qt/2 + c't subject to |t_i| <= radius_i, the tangential problem (paper, eq (22)), natively.
+    """Solve min t'Qt/2 + c't subject to |t_i| <= radius_i, the tangential problem (paper, eq (22)), natively.
 
-    Q (k d, k d) symmetric positive semidefinite, c (k, d), radius (k,) >= 0. Returns t (k, d) and whether the natural
-    map |t - P(t - step (Q t + c))| is at most tol max(|t|, step |c|). In rounds: the gradient is taken in double
-    precision at the start of a round and its change in single precision, which halves the memory traffic.
+    In rounds: the gradient is taken in double precision at the start of a round and its change in single precision,
+    which halves the memory traffic.
+
+    Parameters
+    ----------
+    Q
+        (k d, k d) symmetric positive semidefinite array.
+    c
+        (k, d) linear term.
+    radius
+        (k,) bounds, at least 0.
+    start
+        (k, d) point to start from; None: zero.
+    tol
+        Bound of the natural map |t - P(t - step (Q t + c))| over max(|t|, step |c|).
+
+    Returns
+    -------
+    tuple
+        t (k, d), and whether it meets the tolerance.
     """
     single, none = Q.astype(np.float32), np.zeros(0)
-    step = 1 / (MARGIN * largest_eigenvalue(single) or 1.0)
+    step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(single) or 1.0)
     t = disc(np.zeros_like(c) if start is None else start, radius)
     before = np.inf
     for _ in range(ROUNDS):
@@ -113,7 +130,7 @@ def disc_qp(
             return u + unit * (single @ change.ravel()).reshape(y.shape).astype(float)  # noqa: B023
 
         before = error
-        t, _ = accelerate(
+        t, _ = _accelerate(
             gradient, lambda y, lam: (disc(y, radius), lam), t, none, step, max(1e-4 * error, 0.3 * tol * size)
         )
     return t, False

@@ -27,9 +27,10 @@ from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import cylinder_derivative
 from contactopt.problem.laws import Law
+from contactopt.solving.constants import EIGENVALUE_MARGIN
 from contactopt.solving.kernels.alart_curnier import cold_start
 from contactopt.solving.kernels.balance import project_balanced
-from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue
+from contactopt.solving.kernels.mprgp import largest_eigenvalue
 from contactopt.solving.kernels.sparse_blocks import block_matrix
 from contactopt.solving.methods import NATIVE, Iterate
 from contactopt.solving.methods.proximal import proximal_equations
@@ -74,7 +75,7 @@ class AugmentedLagrangian:
 
     def _uzawa(self, problem: InterfaceProblem, start: Iterate | None) -> Iterator[Iterate]:
         r, lam = (np.zeros(problem.q.shape), np.zeros(len(problem.s))) if start is None else start
-        rho, low = 1 / (MARGIN * largest_eigenvalue(problem.Q) or 1.0), problem.law.lowest
+        rho, low = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(problem.Q) or 1.0), problem.law.lowest
         while True:
             y = r - rho * ((problem.Q @ r.ravel()).reshape(r.shape) + problem.q)
             height = y[:, 0] - rho * (problem.V @ lam).reshape(r.shape)[:, 0]

@@ -7,10 +7,11 @@
    and a few steps of the proximal loop for the last digits. They need no symmetric Q and no backend.
 3. Where these fail and Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point, convex programs.
    Where that fails too, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
-4. Where Q is sparse: interior-point paths drawn at random, PATHS of them, since one that ends early says nothing of the next;
+4. The path that turns back where it must (contactopt.solving.kernels.homotopy), at most TURNING linear systems of it.
+5. Where Q is sparse: interior-point paths drawn at random, PATHS of them, since one that ends early says nothing of the next;
    then the proximal loop from the best of all points, its weight falling slowly: jammed packings need hundreds of steps.
-   When SPARSE_ROUND of them have not halved the residual, the same again, with twice the patience.
-5. Else the proximal loop from the best point. When ROUND outer iterations have not halved the residual, twice as many after
+   When SPARSE_ROUND of them have not halved the residual, the same again on other paths, with twice the patience.
+6. Else the proximal loop from the best point. When ROUND outer iterations have not halved the residual, twice as many after
    each restart, the loop starts again from contact forces drawn at random (fixed seed, so that runs repeat) and larger than
    those of the point it leaves: strong friction may have solutions that repel the loop and others that attract it.
 It ends where the driver's certificate or limits say so. There is no proof that it finds a solution: Coulomb's problem
@@ -45,8 +46,10 @@ from contactopt.solving.constants import (
     PROGRESS,
     ROUND,
     SPARSE_ROUND,
+    TURNING,
 )
 from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equations, definite
+from contactopt.solving.kernels.homotopy import homotopy_iterates
 from contactopt.solving.kernels.interior import Path, interior_iterates
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.solving.methods import NATIVE, Iterate, Known
@@ -100,13 +103,19 @@ class Auto:
         matrix = block_matrix(problem.Q, problem.dim)
         if start is not None and sp.issparse(problem.Q):
             reached = yield from self._proximal(problem, matrix, start, POLISH, LEAST_ALPHA)
-        if AcaryCadoux().solves(problem.law) and not problem.law.dilatant:
+        interior = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
+        if interior:
             for full in (True, False):
-                reached = yield from self._interior(problem, matrix, reached, Path(full))
+                reached = yield from self._interior(
+                    problem, matrix, reached, interior_iterates(problem, matrix, Path(full))
+                )
             if problem.symmetric and not sp.issparse(problem.Q):
                 reached = yield from self._cones(problem, reached)
         if infeasibility(problem) is not None:  # the driver says so
             return
+        if interior:
+            turning = homotopy_iterates(problem, matrix, TURNING)
+            reached = yield from self._interior(problem, matrix, reached, turning)
         if sp.issparse(problem.Q):
             yield from self._jammed(problem, matrix, reached)
             return
@@ -121,15 +130,18 @@ class Auto:
 
     @staticmethod
     def _jammed(problem: InterfaceProblem, matrix: Blocks, reached: Iterate) -> Generator[Iterate, None, None]:
-        """Without end: interior-point paths drawn at random, and the gentle proximal loop from the best point so far."""
+        """Without end: paths drawn at random, and the gentle proximal loop from the best point so far."""
         from contactopt.solving.methods.cone import AcaryCadoux
 
         random, evaluate = np.random.default_rng(0), proximal_equations(problem, matrix).evaluate
         interior = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         for restarts in count():
+            if interior and restarts:
+                turning = homotopy_iterates(problem, matrix, TURNING * 2**restarts, random)
+                reached = yield from Auto._interior(problem, matrix, reached, turning)
             for _ in range(PATHS if interior else 0):
                 path = Path.random(random, problem.contacts)
-                reached = yield from Auto._interior(problem, matrix, reached, path)
+                reached = yield from Auto._interior(problem, matrix, reached, interior_iterates(problem, matrix, path))
             patience = SPARSE_ROUND * 2**restarts
             last = yield from Auto._proximal(problem, matrix, reached, patience, GENTLE_ALPHA, gentle=True)
             reached = min(reached, last, key=lambda point: evaluate(*point)[0])
@@ -154,17 +166,26 @@ class Auto:
     def _newton(
         problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
     ) -> Generator[Iterate | Known, None, Iterate]:
-        """Newton's iterates; returns the best. What comes next needs the entries of Q: not before they cost no more."""
-        best, reached, since = np.inf, start, 0
+        """Newton's iterates; returns the best. What comes next needs the entries of Q: not before they cost no more.
+
+        A start that leads nowhere is given up for the solution of the bonded problem, from which Newton's method begins
+        where it has none.
+        """
+        best, reached = np.inf, start
         operator = problem.Q if isinstance(problem.Q, InterfaceOperator) else None
-        for steps, (point, residual) in enumerate(Newton(preconditioner=preconditioner).steps(problem, start)):
-            yield point
-            since = 0 if residual < PROGRESS * best else since + 1
-            if residual < best:
-                best, reached = residual, point[:2]
-            tired = since >= PATIENCE or steps >= NEWTON_STEPS
-            if tired and (operator is None or operator.products >= problem.q.size):
-                break
+        for begin in (start, None) if start is not None else (None,):
+            least, since = np.inf, 0
+            for steps, (point, residual) in enumerate(Newton(preconditioner=preconditioner).steps(problem, begin)):
+                yield point
+                since = 0 if residual < PROGRESS * least else since + 1
+                least = min(least, residual)
+                if residual < best:
+                    best, reached = residual, point[:2]
+                tired = since >= PATIENCE or steps >= NEWTON_STEPS
+                if tired and (begin is not None or operator is None or operator.products >= problem.q.size):
+                    break
+            if begin is not None:
+                note(logger, "Newton's method made no progress from the given start and begins anew without it")
         return reached or cold_start(problem)
 
     @staticmethod
@@ -187,14 +208,14 @@ class Auto:
 
     @staticmethod
     def _interior(
-        problem: InterfaceProblem, matrix: Blocks, start: Iterate, path: Path
+        problem: InterfaceProblem, matrix: Blocks, start: Iterate, points: Iterator[tuple[Iterate, float]]
     ) -> Generator[Iterate, None, Iterate]:
-        """The interior-point method and, where it came near to a solution, a few proximal steps for the last digits.
+        """Points with their errors and, where they came near to a solution, a few proximal steps for the last digits.
 
         Returns the last point or a better `start`.
         """
         best, reached = np.inf, start
-        for point, error in interior_iterates(problem, matrix, path):
+        for point, error in points:
             yield point
             if error < best:
                 best, reached = error, point

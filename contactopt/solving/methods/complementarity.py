@@ -62,7 +62,20 @@ class Lemke:
 def complementarity_problem(
     problem: InterfaceProblem, copositive: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M (m, m), q (m,), C (2k, c) of the LCP  0 <= z, M z + q >= 0, z'(M z + q) = 0;  r = C z[:c], lambda last in z."""
+    """Write a problem in 2D as an LCP  0 <= z, M z + q >= 0, z'(M z + q) = 0;  r = C z[:c], lambda last in z.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of k contacts under Coulomb's law.
+    copositive
+        Whether the form with 4 k unknowns is written, whose matrix is copositive.
+
+    Returns
+    -------
+    tuple
+        M (m, m), q (m,) and C (2 k, c).
+    """
     k, p = problem.contacts, len(problem.s)
     normal, tangent, eye = np.eye(2 * k)[:, ::2], np.eye(2 * k)[:, 1::2], np.eye(k)
     if copositive:
@@ -77,7 +90,20 @@ def complementarity_problem(
 
 
 def lemke(M: np.ndarray, q: np.ndarray) -> np.ndarray | None:
-    """A solution z (m,) of the LCP (M (m, m), q (m,)) by complementary pivots on w - M z - z0 = q; None: a ray."""
+    """Solve a linear complementarity problem by complementary pivots on w - M z - z0 = q.
+
+    Parameters
+    ----------
+    M
+        (m, m) matrix.
+    q
+        (m,) right-hand side.
+
+    Returns
+    -------
+    ndarray or None
+        A solution z (m,) with z >= 0, M z + q >= 0 and z'(M z + q) = 0; None if the pivots end on a ray.
+    """
     m = len(q)
     if np.all(q >= 0):
         return np.zeros(m)

@@ -86,7 +86,22 @@ def _opening(problem: InterfaceProblem, r: np.ndarray, multipliers: np.ndarray) 
 
 
 def cone_program(problem: InterfaceProblem, bridge: str, backend: str) -> Callable[[np.ndarray], Iterate]:
-    """Opening mu s (k,) -> r (k, dim) and multipliers (p,) of the program above."""
+    """Prepare the cone program of the module's head for one opening after the other.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of k contacts.
+    bridge
+        A name in BRIDGES.
+    backend
+        A name in CONIC, where the bridge is cvxpy.
+
+    Returns
+    -------
+    callable
+        A function of the opening mu s (k,) [length] that returns r (k, dim) and multipliers (p,).
+    """
     V, s_plates = problem.V, problem.s
     if bridge == "cvxpy":
         from contactopt.models import acary_cadoux

@@ -24,15 +24,14 @@ from contactopt.checks import check_number
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
 from contactopt.problem.laws import Law
-from contactopt.solving.constants import SHARPER, SHARPEST
+from contactopt.solving.constants import EIGENVALUE_MARGIN, ROUGH_NORMAL, SHARPER, SHARPEST
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.balance import project_balanced
-from contactopt.solving.kernels.mprgp import MARGIN, largest_eigenvalue, smalbe
+from contactopt.solving.kernels.mprgp import largest_eigenvalue, smalbe
 from contactopt.solving.kernels.semismooth import Projection, crossover
 from contactopt.solving.methods import NATIVE, Iterate
 
 INNER = 5000  # Uzawa steps in one tangential problem
-ROUGH = 1e-4  # of the normal problem, before the active set steps
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ class Part:
         self.problem, self.own, self.shape = problem, own, here.shape
         self.q, self.V, self.V_there = problem.q.ravel()[rows], problem.V[rows], problem.V[others]
         self.Q, self.coupling = problem.Q[np.ix_(rows, rows)], problem.Q[np.ix_(rows, others)]
-        self.step = 1 / (MARGIN * largest_eigenvalue(self.Q) or 1.0)
+        self.step = 1 / (EIGENVALUE_MARGIN * largest_eigenvalue(self.Q) or 1.0)
 
     def data(self, fixed: np.ndarray, lam: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Linear term, own rigid motions and their resultants, given the other components' forces."""
@@ -91,7 +90,7 @@ class Part:
         """The normal QP."""
         low = self.problem.law.lowest
         c, V, s = self.data(r_t, lam)
-        rough = smalbe(self.Q, c, low, V.T, -s, r_n, lam[self.own], ROUGH)
+        rough = smalbe(self.Q, c, low, V.T, -s, r_n, lam[self.own], ROUGH_NORMAL)
         project: Projection = lambda y: half_line_derivative(y, low)  # noqa: E731
         r, new = crossover(self.Q, c, V, s, project, rough.x[:, None], rough.multipliers)
         return r[:, 0], new

@@ -23,21 +23,22 @@ from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import Law
+from contactopt.solving.constants import (
+    CLOSER,
+    COARSE_ENOUGH,
+    COARSE_STEPS,
+    COARSE_TRIES,
+    COARSEST_ENOUGH,
+    NESTED_LOOSEST,
+    NESTED_TIGHTEST,
+)
 from contactopt.solving.kernels.levels import Evaluation, Level, Point, step
 from contactopt.solving.methods import NATIVE, Iterate, find_method
 from contactopt.solving.notes import note
 
 logger = logging.getLogger(__name__)
 
-LOOSEST, TIGHTEST = 0.1, 1e-4  # relative accuracy of a step: while contacts still open or close, and at last
-ROUGH = 3e-2  # residual at which a coarse grid has done its work, over the size of the forces
-SURE = 1e-4  # and the coarsest grid, from which the others must not be led astray
-NEAR = 1e-8  # and from which on iterates of the finest grid are shown to the driver
-CLOSER = (
-    0.1  # residual of a given start over that of the coarse grids' answer from which on Newton's steps go on from it
-)
-STEPS = 30  # on a coarse grid
-TRIES = 80  # iterates of the default method there, where Newton's steps fail
+NEAR = 1e-8  # residual over the size of the forces, from which on iterates of the finest grid are shown to the driver
 
 
 @dataclass(frozen=True)
@@ -64,9 +65,11 @@ class Nested:
         while levels[-1].halves:
             levels.append(levels[-1].coarse())
         given = None if start is None else (start[0].T[list(levels[0].components)].copy(), start[1])
-        point = robust_start(levels[-1], first_guess(levels, given)) if len(levels) > 1 else first_guess(levels, given)
+        point = (
+            _robust_start(levels[-1], _first_guess(levels, given)) if len(levels) > 1 else _first_guess(levels, given)
+        )
         for coarse, fine in zip(levels[:0:-1], levels[-2::-1]):
-            point, at = solve_level(coarse, point)
+            point, at = _solve_level(coarse, point)
             logger.info("grid %s: residual %.1e", coarse.kernel.grid, at.residual)
             point = fine.refined(point, coarse)
         finest, at, last = levels[0], levels[0].evaluate(*point), np.inf
@@ -75,8 +78,8 @@ class Nested:
             point, at = (given, other) if other.residual < CLOSER * at.residual else (point, at)
         while True:
             if at.residual <= NEAR * max(1.0, float(np.linalg.norm(point[0]))) or at.residual > 0.5 * last:
-                yield (whole(problem, point[0] + at.error), point[1]), at.residual
-            change, count = step(finest, at, worth(at.residual, last))
+                yield (_whole(problem, point[0] + at.error), point[1]), at.residual
+            change, count = step(finest, at, _worth(at.residual, last))
             last = at.residual
             point = point[0] + change[0], point[1] + change[1]
             at = finest.evaluate(*point)
@@ -89,7 +92,7 @@ class Nested:
             )
 
 
-def first_guess(levels: list[Level], given: Point | None) -> Point:
+def _first_guess(levels: list[Level], given: Point | None) -> Point:
     """A point on the coarsest level: the one given, or the forces spread evenly that balance the loads."""
     coarsest = levels[-1]
     if given is not None:
@@ -107,44 +110,49 @@ def first_guess(levels: list[Level], given: Point | None) -> Point:
     return r, lam
 
 
-def robust_start(coarsest: Level, point: Point) -> Point:
+def _robust_start(coarsest: Level, point: Point) -> Point:
     """A solution on the coarsest grid: by Newton's steps, or where they go astray by the default method on an array Q."""
-    reached, at = solve_level(coarsest, point, SURE)
-    if at.residual <= SURE * float(np.linalg.norm(reached[0])) or len(coarsest.components) < coarsest.kernel.dim:
+    reached, at = _solve_level(coarsest, point, COARSEST_ENOUGH)
+    if (
+        at.residual <= COARSEST_ENOUGH * float(np.linalg.norm(reached[0]))
+        or len(coarsest.components) < coarsest.kernel.dim
+    ):
         return reached
     note(logger, "Newton's method failed on the coarsest grid, so the default method starts there from an array Q")
     V = np.moveaxis(coarsest.V, 0, 1).reshape(coarsest.q.size, -1)
     small = InterfaceProblem(coarsest.kernel.entries(), coarsest.q.T, coarsest.law, V=V, s=coarsest.s)
     best = at.residual
-    for r, lam, *_ in islice(find_method("auto").iterate(small), TRIES):
+    for r, lam, *_ in islice(find_method("auto").iterate(small), COARSE_TRIES):
         candidate = np.ascontiguousarray(r.T), lam
         residual = coarsest.evaluate(*candidate).residual
         if residual < best:
             reached, best = candidate, residual
-        if best <= SURE * float(np.linalg.norm(reached[0])):
+        if best <= COARSEST_ENOUGH * float(np.linalg.norm(reached[0])):
             break
     return reached
 
 
-def solve_level(level: Level, point: Point, enough: float = ROUGH) -> tuple[Point, Evaluation]:
+def _solve_level(level: Level, point: Point, enough: float = COARSE_ENOUGH) -> tuple[Point, Evaluation]:
     """Newton's steps on a coarse grid, until the residual is small beside the forces."""
     at, last = level.evaluate(*point), np.inf
-    for _ in range(STEPS):
+    for _ in range(COARSE_STEPS):
         if at.residual <= enough * float(np.linalg.norm(point[0])):
             break
-        change, _ = step(level, at, worth(at.residual, last))
+        change, _ = step(level, at, _worth(at.residual, last))
         last = at.residual
         point = point[0] + change[0], point[1] + change[1]
         at = level.evaluate(*point)
     return point, at
 
 
-def worth(residual: float, last: float) -> float:
+def _worth(residual: float, last: float) -> float:
     """Relative accuracy of a step: little while the residual does not fall, because the contacts still change."""
-    return min(LOOSEST, max(TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else LOOSEST
+    return (
+        min(NESTED_LOOSEST, max(NESTED_TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else NESTED_LOOSEST
+    )
 
 
-def whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:
+def _whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:
     """Reactions (k, dim) from the components (c, k) that were solved for."""
     out = np.zeros(problem.q.shape)
     out[:, : len(r)] = r.T

@@ -80,7 +80,23 @@ class Newton:
             yield point
 
     def steps(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[tuple[Iterate | Known, float]]:
-        """Iterates with the residual of the equations that each step began with."""
+        """Iterate as `iterate` does, and tell the residual of the equations.
+
+        Parameters
+        ----------
+        problem, start
+            As for `iterate`.
+
+        Yields
+        ------
+        tuple
+            An iterate, and the residual of the equations that its step began with.
+
+        Raises
+        ------
+        InputError
+            If the linear algebra that was asked for does not fit Q.
+        """
         form = problem.Q.coupled if isinstance(problem.Q, InterfaceOperator) else None
         if self.linear == "coupled" and form is None:
             raise InputError("linear='coupled' needs bodies that are solved by iteration; take the solver 'multigrid'.")

@@ -102,11 +102,11 @@ class Local:
     def __init__(self, W: np.ndarray, mu: float, bilateral: bool):
         self.W, self.mu, self.bilateral = W, mu, bilateral
         self.compliance = float(W[0, 0])
-        w = W[1:, 0] / self.compliance if self.compliance > 0 else W[1:, 0]
-        values, axes = np.linalg.eigh(W[1:, 1:] - np.outer(w, W[0, 1:]))  # tangential axes in which S is diagonal
+        w = W[0, 1:] / self.compliance if self.compliance > 0 else W[0, 1:]
+        S = W[1:, 1:] - np.outer(W[1:, 0], w)
         floor = 1e-12 * float(np.trace(np.abs(W)) or 1.0)
-        self.values, self.axes = [max(float(a), floor) for a in values], axes
-        self.w = (axes.T @ w).tolist()
+        S = np.maximum(S, floor) if len(S) == 1 else S + floor * np.eye(2)
+        self.S, self.w, self.tn = S.tolist(), w.tolist(), W[1:, 0].tolist()
 
     def solve(self, v: list[float]) -> np.ndarray:
         """r (dim,). Where several forces satisfy the law: open, else stick, else slip."""
@@ -115,35 +115,35 @@ class Local:
             return out
         press, b = -v[0] / self.compliance, [0.0] * len(self.w)
         if self.mu > 0 and press != 0:
-            t, A = v[1:], self.axes
-            b = t if len(t) == 1 else [A[0, 0] * t[0] + A[1, 0] * t[1], A[0, 1] * t[0] + A[1, 1] * t[1]]
-            b = [x + w * self.compliance * press for x, w in zip(b, self.w)]
-            b = self._tangential(b, press)
-            out[1:] = b if len(b) == 1 else A @ b
+            b = self._tangential([x + w * press for x, w in zip(v[1:], self.tn)], press)
+            out[1:] = b
         out[0] = press - sum(w * t for w, t in zip(self.w, b))
         return out
 
     def _tangential(self, b: list[float], press: float) -> list[float]:
-        """r_t in the axes of S: stick, or the root l of |r_t| = mu r_n."""
+        """r_t: stick, or the root l of |r_t| = mu r_n."""
         mu, sign = self.mu, 1.0 if press > 0 else -1.0
         if len(b) == 1:
-            t, bound = -b[0] / self.values[0], mu * (press + self.w[0] * b[0] / self.values[0])
+            t = -b[0] / self.S[0][0]
+            bound = mu * (press - self.w[0] * t)
             if abs(t) <= (abs(bound) if self.bilateral else bound):
                 return [t]
             way = 1.0 if t > 0 else -1.0
             return [way * mu * abs(press) / (1 + mu * sign * self.w[0] * way)]
-        (b1, b2), (s1, s2), (w1, w2) = b, self.values, self.w
+        (b1, b2), ((s11, s12), (s21, s22)), (w1, w2) = b, self.S, self.w
         low, level = 0.0, 0.0
         high = hypot(b1, b2) * (1 + mu * hypot(w1, w2)) / (mu * abs(press))
         for _ in range(STEPS):
-            t1, t2 = -b1 / (s1 + level), -b2 / (s2 + level)
+            det = (s11 + level) * (s22 + level) - s12 * s21
+            t1, t2 = (s12 * b2 - (s22 + level) * b1) / det, (s21 * b1 - (s11 + level) * b2) / det
             size, normal = hypot(t1, t2), press - w1 * t1 - w2 * t2
             way = -1.0 if self.bilateral and normal < 0 else 1.0
             excess = size - mu * way * normal
             if (level == 0.0 and excess <= 0) or abs(excess) <= ROOT * size:
                 break
             low, high = (level, high) if excess > 0 else (low, level)
-            d1, d2 = -t1 / (s1 + level), -t2 / (s2 + level)  # derivatives by level
+            # derivatives by level
+            d1, d2 = (s12 * t2 - (s22 + level) * t1) / det, (s21 * t1 - (s11 + level) * t2) / det
             slope = (t1 * d1 + t2 * d2) / size + mu * way * (w1 * d1 + w2 * d2)
             level = level - excess / slope if slope < 0 else high
             level = level if low < level < high else (low + high) / 2

@@ -58,7 +58,20 @@ class Proximal:
 
 
 def proximal_equations(problem: InterfaceProblem, matrix: Blocks) -> ProximalEquations:
-    """Alart and Curnier's equations of a dimensionless problem, without a proximal term."""
+    """Write Alart and Curnier's equations of a dimensionless problem, without a proximal term.
+
+    Parameters
+    ----------
+    problem
+        The dimensionless interface problem.
+    matrix
+        Its Q, ready for block systems.
+
+    Returns
+    -------
+    ProximalEquations
+        The equations, which `at` gives a centre and a weight.
+    """
     compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1)
     return ProximalEquations(matrix, problem.q, problem.V, problem.s, problem.law.project, compliance)
 
@@ -66,9 +79,24 @@ def proximal_equations(problem: InterfaceProblem, matrix: Blocks) -> ProximalEqu
 def proximal_iterates(
     equations: ProximalEquations, point: Iterate, alpha: float, gentle: bool = False
 ) -> Iterator[Iterate]:
-    """Solutions of one proximal subproblem after another, or of a failed one the point that Newton's method left it at.
+    """Solve one proximal subproblem after another.
 
-    gentle  alpha changes slowly, so that few subproblems fail: for problems on which every smaller alpha soon fails
+    Parameters
+    ----------
+    equations
+        The equations of the problem.
+    point
+        Forces (k, dim) and multipliers (p,) to start from.
+    alpha
+        The first weight of the proximal term.
+    gentle
+        Whether alpha changes slowly, so that few subproblems fail: for problems on which every smaller alpha soon
+        fails.
+
+    Yields
+    ------
+    tuple
+        The solution of each subproblem, or of a failed one the point that Newton's method left it at.
     """
     (fall, rise), easy = ((GENTLE_FALL, GENTLE_RISE), EASY) if gentle else ((FALL, RISE), SUBPROBLEM_STEPS)
     while alpha < LARGEST_WEIGHT:

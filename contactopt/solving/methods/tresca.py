@@ -57,7 +57,7 @@ class Tresca:
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         convex = TrescaProblem(self.backends(problem.dim)[0], problem)
-        r = glued(problem) if start is None else start[0]
+        r = _glued(problem) if start is None else start[0]
         g = problem.law.bound(r[:, 0])
         while True:
             r, multipliers = convex.solve(g, r)
@@ -65,7 +65,7 @@ class Tresca:
             yield r, multipliers
 
 
-def glued(problem: InterfaceProblem) -> np.ndarray:
+def _glued(problem: InterfaceProblem) -> np.ndarray:
     """Reactions (k, dim) of contacts that all stick if plates press the bodies together, else zeros."""
     r, (k, dim) = np.zeros(problem.q.shape), problem.q.shape
     if len(problem.s) == 0:

@@ -100,7 +100,18 @@ PRECONDITIONERS = {
 
 
 def find_preconditioner(name: str | None) -> None:
-    """InputError unless there is a preconditioner of that name; None and 'none' are choices of the methods."""
+    """Check that there is a preconditioner of a name. None and 'none' are choices of the methods.
+
+    Parameters
+    ----------
+    name
+        The name that the user gave.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
     if name not in (None, "none", *PRECONDITIONERS):
         raise InputError(f"unknown preconditioner {name!r}; choose from {', '.join(PRECONDITIONERS)}.")
 
@@ -159,11 +170,21 @@ def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Precondit
 
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
-    """Smooth motions of every pair of surfaces, (k dim, j): polynomials of the place, in every component.
+    """Write smooth motions on every pair of surfaces as columns: polynomials of the place, in every component.
 
     On a pair that is far from all others they are constant and linear. Forces whose waves are longer than the distance to the
     next pair reach it through the body in between, which no model of one pair knows. A thin slice of a body bends
     under them as a plate does. Therefore the degree grows with the length of a pair over that distance.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of k contacts.
+
+    Returns
+    -------
+    ndarray
+        (k dim, j) forces.
     """
     parts = [_smooth_motions(part_of(problem, pair), degree) for pair, degree in zip(problem.pairs, degrees(problem))]
     return np.asarray(la.block_diag(*parts))
@@ -210,14 +231,29 @@ def _smooth_motions(problem: InterfaceProblem, degree: int) -> np.ndarray:
 
 
 def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
-    """P made exact on the columns of Z (n, j), which are made orthonormal in the energy first, Z'QZ = I:
+    """Make a preconditioner exact on some columns: (I - Z Z'Q) c P (I - Q Z Z') + Z Z', with Z'QZ = I.
 
-    (I - Z Z'Q) c P (I - Q Z Z') + Z Z'.
-
-    The factors c, one for each block of P, put the mean eigenvalue of P Q on what is not exact about 1, where those of the exact part
-    are. Needs j products with Q once and another one for each block; each application adds O(n j). Its inverse is the
-    block secant update of P^-1 = G (Schnabel 1983),
+    The columns are made orthonormal in the energy first. The factors c, one for each block of P, put the mean eigenvalue
+    of P Q on what is not exact about 1, where those of the exact part are. It needs j products with Q once, and another
+    one for each block; each application adds O(n j). Its inverse is the block secant update of P^-1 = G,
     G/c - G/c Z (Z'G/c Z)^-1 Z'G/c + QZ (QZ)'.
+
+    Sources: Mandel (1993), Balancing domain decomposition; Schnabel (1983), Quasi-Newton methods using multiple secant
+    equations.
+
+    Parameters
+    ----------
+    P
+        The preconditioner, with its model G of Q if it has one.
+    Q
+        (n, n) interface operator.
+    Z
+        (n, j) the columns.
+
+    Returns
+    -------
+    Preconditioner
+        The preconditioner, with the model that belongs to it.
     """
     Z, QZ = _orthonormal(Z, np.asarray(Q @ Z))
     c = _scales(P, Q, QZ)
@@ -270,10 +306,24 @@ def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
 
 
 def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> LinearOperator:
-    """An approximate inverse of U'QU + diag(added), for U (n, m) with orthonormal columns and added (m,) >= 0.
+    """Make an approximate inverse of U'QU + diag(added).
 
-    U selects the unknowns of an active set, or directions in which contacts may still move. With a model G of Q,
-    (U'GU + diag(added))^-1 by an inner PCG; without, U'PU (paper, section 5.2).
+    U selects the unknowns of an active set, or directions in which contacts may still move. With a model G of Q it is
+    (U'GU + diag(added))^-1 by an inner PCG; without one it is U'PU (paper, section 5.2).
+
+    Parameters
+    ----------
+    P
+        The preconditioner, with its model G of Q if it has one.
+    U
+        (n, m) sparse matrix with orthonormal columns.
+    added
+        (m,) at least zero.
+
+    Returns
+    -------
+    LinearOperator
+        (m, m).
     """
     m = U.shape[1]
     rows = LinearOperator((m, m), matvec=lambda x: U.T @ (P @ (U @ x.ravel())), dtype=float)
@@ -285,6 +335,19 @@ def restricted(P: Preconditioner, U: sp.csr_matrix, added: np.ndarray) -> Linear
 
 
 def selection(n: int, unknowns: np.ndarray) -> sp.csr_matrix:
-    """U (n, m) whose columns are the unit vectors of these unknowns (m,)."""
+    """Write the matrix whose columns are the unit vectors of some unknowns.
+
+    Parameters
+    ----------
+    n
+        Number of all unknowns.
+    unknowns
+        (m,) the chosen ones.
+
+    Returns
+    -------
+    csr_matrix
+        U (n, m).
+    """
     m = len(unknowns)
     return sp.csr_matrix((np.ones(m), (unknowns, np.arange(m))), (n, m))

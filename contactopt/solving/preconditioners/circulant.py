@@ -14,9 +14,19 @@ INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes
 
 
 def seminorm(m: float) -> np.ndarray:
-    """First column (2m,) of the sparse circulant matrix of the H^1/2 seminorm, eq (27); about log2 m entries.
+    """Compute the first column of the sparse circulant matrix of the H^1/2 seminorm, eq (27).
 
-    Its rows sum to zero where m is a power of two: constants are the kernel of a seminorm.
+    It has about log2 m entries. Its rows sum to zero where m is a power of two: constants are the kernel of a seminorm.
+
+    Parameters
+    ----------
+    m
+        Half the number of nodes of the closed curve.
+
+    Returns
+    -------
+    ndarray
+        (2 m,) column.
     """
     column, top = np.zeros(round(2 * m)), int(np.ceil(np.log2(m)))
     column[0] = 2 * np.sum(1 / np.arange(1, 2**top) ** 2.0)
@@ -28,7 +38,20 @@ def seminorm(m: float) -> np.ndarray:
 
 
 def norm(m: float, h: float) -> np.ndarray:
-    """First column (2m,) of the circulant matrix of the H^1 norm, eq (28)."""
+    """Compute the first column of the circulant matrix of the H^1 norm, eq (28).
+
+    Parameters
+    ----------
+    m
+        Half the number of nodes of the closed curve.
+    h
+        The distance of two nodes.
+
+    Returns
+    -------
+    ndarray
+        (2 m,) column.
+    """
     column = np.zeros(round(2 * m))
     column[0], column[[1, -1]] = 2 / h + h, -1 / h
     return column
@@ -84,8 +107,8 @@ def extended(grid: Grid) -> tuple[GridMap, None]:
     The product of P with arrays (*shape, dim), and None because its inverse is not cheap.
     """
     if grid.closed:
-        symbol, smallest = closed_symbol(*grid.shape)
-        return circular(np.maximum(symbol, smallest / 2)), None
+        symbol, smallest = _closed_symbol(*grid.shape)
+        return _circular(np.maximum(symbol, smallest / 2)), None
     lines = [restricted_circulant(rfft(seminorm(closed_curve(k))).real, k, axis) for axis, k in enumerate(grid.shape)]
     return lambda X: np.sum([line(X) for line in lines], axis=0), None
 
@@ -111,9 +134,9 @@ def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
         raise InputError("preconditioner 'p22' is for contact lines (2D); in 3D choose p21 or neumann.")
     (k,) = grid.shape
     if grid.closed:
-        symbol, smallest = closed_symbol(k)
+        symbol, smallest = _closed_symbol(k)
         symbol = np.maximum(symbol, smallest / 2) / fft(norm(k / 2, 4 / k)).real
-        return circular(1 / symbol), circular(symbol)
+        return _circular(1 / symbol), _circular(symbol)
     m = closed_curve(k)
     symbol = rfft(seminorm(m)).real / rfft(norm(m, 4 / (k - 1))).real
     product, guess = restricted_circulant(symbol, k, 0), extended(grid)[0]
@@ -126,7 +149,7 @@ def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
     return solve, product
 
 
-def closed_symbol(k: int) -> tuple[np.ndarray, float]:
+def _closed_symbol(k: int) -> tuple[np.ndarray, float]:
     """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the smallest of them that is not zero.
 
     A closed curve needs no extension. The eigenvalue of constant functions must be zero. Where k is no power of two, the
@@ -137,18 +160,44 @@ def closed_symbol(k: int) -> tuple[np.ndarray, float]:
     return symbol, float(symbol[1:].min())
 
 
-def circular(symbol: np.ndarray) -> GridMap:
+def _circular(symbol: np.ndarray) -> GridMap:
     """Circulant matrix with that (real, symmetric) symbol (k,) along the first axis."""
     return lambda X: np.asarray(ifft(symbol[:, None] * fft(X, axis=0), axis=0).real)
 
 
 def closed_curve(k: int) -> int:
-    """Half the number of nodes of the closed curve: a power of two, at least k."""
+    """Choose half the number of nodes of the closed curve.
+
+    Parameters
+    ----------
+    k
+        Number of contacts.
+
+    Returns
+    -------
+    int
+        A power of two, at least k.
+    """
     return int(2 ** np.ceil(np.log2(k)))
 
 
 def restricted_circulant(symbol: np.ndarray, k: int, axis: int) -> GridMap:
-    """E' C E along one axis of k nodes for the circulant matrix with that (real, symmetric) symbol."""
+    """Make the product E' C E along one axis of k nodes, for a circulant matrix C and the extension E by zero.
+
+    Parameters
+    ----------
+    symbol
+        (m + 1,) eigenvalues of C, which is real and symmetric, of size 2 m.
+    k
+        Number of nodes along the axis.
+    axis
+        The axis of the grid.
+
+    Returns
+    -------
+    callable
+        The product on arrays on the grid.
+    """
     n = 2 * (len(symbol) - 1)
 
     def product(X: np.ndarray) -> np.ndarray:

@@ -1,9 +1,12 @@
 """The fitted numbers of the preconditioners, all of them, and what they were fitted on.
 
 ALONG was chosen for small condition numbers of `laplacian` on the disc of
-`python -m experiments.questions.contact_surfaces`, whose other surfaces judge it (reports/contact_surfaces/report.md).
+`python -m experiments.questions.contact_surfaces`, whose other surfaces judge it (reports/contact_surfaces/report.md). They judge
+PIECE, THINNEST and DISTORTED, too, which were chosen by trial.
 
-SOFT, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the bodies of
+EIGENVECTORS was chosen by the times of both ways on surfaces of 300 to 2,000 unknowns: `python -m experiments.questions.contact_surfaces roots`.
+
+DISPERSION, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the bodies of
 `python -m experiments.questions.preconditioners` (reports/preconditioners.md). On bodies that had no part in that fit, `neumann` is
 judged by `python -m experiments.questions.preconditioners_unseen` (reports/preconditioners_unseen/report.md).
 
@@ -12,8 +15,12 @@ WAVES and MOST_WAVES were chosen for few iterations on the slices of `python -m 
 
 SPLIT = 0.3  # Poisson's ratio of the half-space that is modelled on a surface, whatever the bodies' ratio is
 ALONG = 2.0  # resistance of `laplacian` to tangential waves along their own direction; 1 / (1 - SPLIT)^2 - 1 for a half-space
-SOFT = 0.28  # share by which bilinear elements lower the compliance of the shortest tangential waves along their own direction
+DISPERSION = 0.28  # share by which bilinear elements lower the compliance of the shortest tangential waves along their own direction
 CELL = 0.45  # power of a node's cell that weights it on a surface: 1/2 where the spacing varies slowly
 EDGE = 0.2  # power of the share of the cell that an edge leaves: 0 for a half-space, 1/4 and more for a quarter-space
+EIGENVECTORS = 1200  # unknowns of a surface up to which `laplacian` takes its inverse root from eigenvectors
+PIECE = 0.25  # shift over the least eigenvalue of a piece of the surface that is as long as this one
+THINNEST = 1e-2  # nodal area over mass, relative to the mean, of a contact on an axis
+DISTORTED = 2.0  # area of a cell in the chart over that in space, or one over it, beyond which the chart has no directions there
 WAVES = 3.0  # length of a pair of surfaces over its distance to the next pair that is worth one more degree of smooth motions
 MOST_WAVES = 12  # the highest degree

@@ -41,7 +41,7 @@ class Grid:
         return tuple(len(t) for t in self.ticks)
 
 
-def grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:
+def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:
     """Find the line, closed curve or rectangular grid on which the contacts lie.
 
     The search takes place in the chart, where a rectangular grid may be turned by any angle.
@@ -90,8 +90,28 @@ def grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarr
 
 
 def on_grid(problem: InterfaceProblem, held: np.ndarray, make: Callable[[Grid], GridMaps]) -> GridMaps:
-    """Products on arrays (k, dim) from those on the grid of the contacts (*shape, dim), which `make` gives."""
-    grid, order = grid_of(problem, held)
+    """Make products on arrays (k, dim) from those on the grid of the contacts.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of k contacts on a line, a closed curve or a rectangular grid.
+    held
+        (k, dim) mask of the components that cannot move.
+    make
+        A function of the Grid that returns the product on arrays (n0[, n1], dim), and its inverse or None.
+
+    Returns
+    -------
+    tuple
+        The product on arrays (k, dim), and its inverse or None.
+
+    Raises
+    ------
+    InputError
+        If the contacts lie on no grid.
+    """
+    grid, order = _grid_of(problem, held)
     product, inverse = make(grid)
 
     def placed(act: GridMap) -> GridMap:
@@ -141,6 +161,18 @@ def _turn(places: np.ndarray) -> np.ndarray:
 
 
 def cells_along(ticks: np.ndarray) -> np.ndarray:
-    """Length (k,) of the line that belongs to every tick: half-way to either neighbour, beyond an end as far as before it."""
+    """Measure how much of a line belongs to every tick: half-way to either neighbour, beyond an end as far as before
+    it.
+
+    Parameters
+    ----------
+    ticks
+        (k,) places along the line, ascending, at least two [length].
+
+    Returns
+    -------
+    ndarray
+        (k,) lengths [length].
+    """
     steps = np.diff(ticks)
     return np.concatenate([steps[:1], (steps[:-1] + steps[1:]) / 2, steps[-1:]])

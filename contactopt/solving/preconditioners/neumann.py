@@ -17,7 +17,7 @@ import scipy.linalg as la
 from scipy.fft import dct, dst, fft, idct, idst
 
 from contactopt.problem import InterfaceProblem
-from contactopt.solving.preconditioners.constants import SOFT, SPLIT
+from contactopt.solving.preconditioners.constants import DISPERSION, SPLIT
 from contactopt.solving.preconditioners.grid import EVEN, Grid, GridMap, GridMaps, cells_along, on_grid
 
 # held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j + shift) / k
@@ -44,7 +44,7 @@ class Direction:
     backward: Callable[[np.ndarray, int], np.ndarray]
 
 
-def closed_line(k: int) -> Direction:
+def _closed_line(k: int) -> Direction:
     """The Laplacian around a closed line of k evenly spaced nodes, by the Hartley transform, which is its own inverse."""
 
     def hartley(x: np.ndarray, axis: int) -> np.ndarray:
@@ -55,7 +55,7 @@ def closed_line(k: int) -> Direction:
     return Direction(waves, waves, hartley, hartley)
 
 
-def direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
+def _direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
     """The Laplacian along `ticks`, odd at the ends that are held; on a line as if they were evenly spaced."""
     to, back, kind, shift = TRANSFORMS[bool(held[0]), bool(held[1])]
     k, steps = len(ticks), np.diff(ticks)
@@ -95,10 +95,10 @@ def neumann(problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
     ------
     InputError : if the contacts lie on no such grid
     """
-    return on_grid(problem, held, root_on_grid)
+    return on_grid(problem, held, _root_on_grid)
 
 
-def root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:
+def _root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:
     """Square root of the Laplacian of the contacts, weighted by their sizes, and its inverse.
 
     The Laplacian maps constants to zero, which has no inverse. Half the smallest other eigenvalue of the root stands in
@@ -143,9 +143,9 @@ def _root(grid: Grid, component: int) -> tuple[np.ndarray, list[Direction]]:
     """
     held = grid.held[component]
     if grid.closed:
-        directions = [closed_line(*grid.shape)]
+        directions = [_closed_line(*grid.shape)]
     else:
-        directions = [direction(t, h, len(grid.ticks) == 1) for t, h in zip(grid.ticks, held)]
+        directions = [_direction(t, h, len(grid.ticks) == 1) for t, h in zip(grid.ticks, held)]
     waves = np.meshgrid(*(d.waves for d in directions), indexing="ij")
     squares = sum(np.meshgrid(*(d.squares for d in directions), indexing="ij"))
     spacing = [1.0 if grid.closed else np.ptp(t) / (len(t) - 1) for t in grid.ticks]  # the mean is scaled out later
@@ -156,7 +156,7 @@ def _root(grid: Grid, component: int) -> tuple[np.ndarray, list[Direction]]:
     root = np.sqrt(squares * np.prod(spacing) ** (2 / len(waves)))
     if 0 < component <= len(waves):
         own = waves[component - 1]
-        root /= 1 - own / total * ((SPLIT if len(waves) == 2 else 0.0) + SOFT * own / 4)
+        root /= 1 - own / total * ((SPLIT if len(waves) == 2 else 0.0) + DISPERSION * own / 4)
     if root.flat[0] <= 1e-6 * root.flat[1]:
         root.flat[0] = np.partition(root.ravel(), 1)[1] / 2
     return root, directions

@@ -13,7 +13,8 @@ tangential fields u and v, which couples both components.
 At an edge M is what a contact inside would have, and the share of it that is there enters with the power EDGE, as in
 `neumann`. The shift keeps constants, which a Neumann Laplacian maps to zero; it belongs to each connected piece of the surface.
 Components that cannot move are left out. The inverse root is a rational function whose error falls exponentially with the
-number of its poles: each of them is one sparse factorisation of a matrix of the surface.
+number of its poles: each of them is one sparse factorisation of a matrix of the surface. On a surface of few contacts the
+eigenvectors of L take less time than those factors, and so does a product with them.
 
 Source: Hale, Higham, Trefethen (2008), Computing A^alpha, log(A), and related matrix functions by contour integrals,
 method 3 for the square root. Johnson (1985), Contact mechanics, section 3.6, for the compliance of the half-space.
@@ -25,20 +26,16 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import eigh
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 from scipy.special import ellipj, ellipk, ellipkm1
 
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
-from contactopt.solving.preconditioners.constants import ALONG, EDGE, SPLIT
+from contactopt.solving.preconditioners.constants import ALONG, DISTORTED, EDGE, EIGENVECTORS, PIECE, SPLIT, THINNEST
 
 ACCURACY = 1e-4  # of the rational function
-THINNEST = 1e-2  # nodal area over mass, relative to the mean, of a contact on an axis
-DISTORTED = np.log(
-    2
-)  # of the area of a cell in the chart over that in space: beyond, the chart has no directions there
-PIECE = 0.25  # shift over the least eigenvalue of a piece of the surface that is as long as this one
 
 Act = Callable[[np.ndarray], np.ndarray]
 Root = tuple[Act, Act]  # products with P and with G = P^-1
@@ -83,7 +80,7 @@ def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
         moves = ~held[:, components]
         if moves.any():
             values = np.repeat([mass, shift, share, depth], moves.shape[1], axis=1)
-            made.append((components, moves, factor, square_root(matrix, values, moves.ravel())))
+            made.append((components, moves, factor, _square_root(matrix, values, moves.ravel())))
 
     def product(X: np.ndarray, inverse: bool) -> np.ndarray:
         out = np.zeros(X.shape)
@@ -99,13 +96,25 @@ def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
 
 
 def surface_matrices(points: np.ndarray, cells: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray, np.ndarray]:
-    """Stiffness K (k, k) of the Laplacian, lumped mass (k,), the shift (k,) of the piece that each contact is on, and the
-    share (k,) of a full turn that the cells of a contact span: a half at a straight edge.
+    """Compute the stiffness and the mass of the Laplacian on the mesh of the contacts.
 
     Parameters
     ----------
-    points : (d, k) positions [length]
-    cells : (v, c) corners of lines, triangles or quadrilaterals, which stand for the mean of both ways to cut them
+    points
+        (d, k) positions [length].
+    cells
+        (v, c) corners of lines, triangles or quadrilaterals, which stand for the mean of both ways to cut them.
+
+    Returns
+    -------
+    tuple
+        Stiffness K (k, k), lumped mass (k,), the shift (k,) of the piece that each contact is on, and the share (k,) of
+        a full turn that the cells of a contact span: a half at a straight edge.
+
+    Raises
+    ------
+    InputError
+        If the cells leave out contacts.
     """
     k = points.shape[1]
     K, mass, share = sp.csr_matrix((k, k)), np.zeros(k), np.zeros(k)
@@ -126,20 +135,29 @@ def surface_matrices(points: np.ndarray, cells: np.ndarray) -> tuple[sp.csr_matr
 
 
 def divergences(points: np.ndarray, places: np.ndarray, cells: np.ndarray) -> sp.csr_matrix:
-    """The matrix (2k, 2k) of the integral of div u div v for tangential fields u and v, the components of a contact in a row.
+    """Compute the matrix of the integral of div u div v for tangential fields u and v.
 
     Parameters
     ----------
-    points : (3, k) or (2, k) positions in space [length]
-    places : (2, k) positions in the chart, along whose axes the components are [length]
-    cells : (v, c) as for surface_matrices. Those whose area differs by DISTORTED in the chart, as at its seam, are left out.
+    points
+        (3, k) or (2, k) positions in space [length].
+    places
+        (2, k) positions in the chart, along whose axes the components are [length].
+    cells
+        (v, c) as for `surface_matrices`. Those whose area differs by a factor of DISTORTED in the chart, as at its
+        seam, are left out.
+
+    Returns
+    -------
+    csr_matrix
+        (2 k, 2 k), the components of a contact in a row.
     """
     k = places.shape[1]
     total = sp.csr_matrix((2 * k, 2 * k))
     for corners, part in _cut(cells):
         gradients, measure = _simplices(places, corners)
         true = _simplices(points, corners)[1]
-        measure = np.where(np.abs(np.log(np.maximum(measure, 1e-300) / true)) < DISTORTED, measure, 0.0)
+        measure = np.where(np.abs(np.log(np.maximum(measure, 1e-300) / true)) < np.log(DISTORTED), measure, 0.0)
         for i, own in enumerate(corners):
             for j, other in enumerate(corners):
                 for a in range(2):
@@ -179,7 +197,7 @@ def _simplices(points: np.ndarray, corners: np.ndarray) -> tuple[list[np.ndarray
     return [-second - third, second, third], np.sqrt(square) / 2
 
 
-def square_root(K: sp.csr_matrix, values: np.ndarray, moves: np.ndarray) -> Root:
+def _square_root(K: sp.csr_matrix, values: np.ndarray, moves: np.ndarray) -> Root:
     """Products with P and with G on the unknowns of the mask `moves` (n,), for K (n, n).
 
     values  (4, n) mass, shift, share and depth of the contact of each unknown
@@ -189,19 +207,41 @@ def square_root(K: sp.csr_matrix, values: np.ndarray, moves: np.ndarray) -> Root
     weight = np.sqrt(full * depth) * share**EDGE
     scale = sp.diags(full**-0.5)
     L = sp.csc_matrix(scale @ K[moves][:, moves] @ scale + sp.diags(shift))
-    low, high = float(shift.min()), float(abs(L).sum(axis=1).max())
-    eye = sp.eye(L.shape[0], format="csc")
-    order = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-    poles = [(c, splu(L + s * eye, **order)) for c, s in zip(*inverse_root(low, high))]
-
-    def root(x: np.ndarray) -> np.ndarray:
-        return np.asarray(sum(c * factors.solve(x) for c, factors in poles))
-
+    root = _by_eigenvectors(L) if L.shape[0] <= EIGENVECTORS else _by_poles(L, float(shift.min()))
     return lambda x: weight * (L @ root(weight * x)), lambda x: root(x / weight) / weight
 
 
+def _by_eigenvectors(L: sp.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
+    """Products with L^-1/2, an array: the fewest operations for each product where L is small."""
+    values, vectors = eigh(L.toarray())
+    dense = (vectors / np.sqrt(values)) @ vectors.T
+    return lambda x: np.asarray(dense @ x)
+
+
+def _by_poles(L: sp.csc_matrix, low: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Products with L^-1/2, a sum of sparse solves, for L with eigenvalues of at least `low`."""
+    eye = sp.eye(L.shape[0], format="csc")
+    order = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    high = float(abs(L).sum(axis=1).max())
+    poles = [(c, splu(L + s * eye, **order)) for c, s in zip(*inverse_root(low, high))]
+    return lambda x: np.asarray(sum(c * factors.solve(x) for c, factors in poles))
+
+
 def inverse_root(low: float, high: float, accuracy: float = ACCURACY) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients c (j,) and shifts s (j,) > 0 with x^-1/2 = sum of c / (x + s) for low <= x <= high, to that accuracy."""
+    """Approximate x^-1/2 by a sum of c / (x + s).
+
+    Parameters
+    ----------
+    low, high
+        The bounds of x.
+    accuracy
+        The accuracy of the sum.
+
+    Returns
+    -------
+    tuple
+        The coefficients c (j,) and the shifts s (j,) > 0.
+    """
     m = low / high
     inner, outer = float(ellipk(m)), float(ellipkm1(m))  # K(m) and K(1 - m)
     count = int(np.ceil(-np.log(accuracy / 4) * outer / (2 * np.pi * inner)))

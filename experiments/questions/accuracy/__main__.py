@@ -77,78 +77,88 @@ def judged(rows: list[dict[str, object]]) -> str:
     )
 
 
-TEXT = """Errors are relative to exact solutions (`contactopt.analytic`) unless a unit is given.
+TEXT = """How accurate are the answers, and are the estimated errors honest? Errors are relative to exact solutions (`contactopt.analytic`), unless a unit is
+given. `a` is the half-width or radius of the contact, `c` is that of the stick zone, and `p` is the pressure.
 
 ## Accuracy asked for: `run(scene, accuracy=..., quantity=...)`
 
-Nested solves, warm-started, until the estimated error is below the target. Effectivity is the estimate over
-the true error: {judged}.
-`extrapolated` is the error left after the estimated one is taken off. The rigid indenters (`hertz-*`) and
-punches (`flat-*`) press on blocks 10,000 half-widths large, so that only discretisation errors remain; `rigid-punch-*` are
-the named scenes. Rows: the run that a target led to; a stricter target that was met at once is named instead. Where a target
-was not reached, the next mesh would have had more than 400,000 unknowns. The edge of stick lies between nodes: read from the
-nodes next to it, it jumps by a fraction of an element from mesh to mesh, and estimates were up to twenty times the error;
-read from the slack and the slip an element further, on both sides of it, its error falls smoothly enough.
-The difference of the two readings is the least estimate: where the stick zone is a few nodes wide (mu = .1 in the plane)
-it is all of it.
+contactopt solves on finer and finer meshes, and starts each solve from the last answer. It ends when the estimated error is below the target. The
+*effectivity* is the estimated error over the true error: {judged}.
+`extrapolated` is the error that is left if the estimated error is taken off.
+
+The rigid indenters (`hertz-*`) and punches (`flat-*`) press on blocks that are 10,000 half-widths large, so that only errors of the mesh
+remain. `rigid-punch-*` are the named scenes. A row is the run to which a target led. If a stricter target was met by the same run, it is
+named instead. If a target was not reached, the next mesh would have had more than 400,000 unknowns.
+
+The edge of the stick zone lies between nodes. If it is read from the nodes next to it, it jumps by a fraction of an element from mesh to
+mesh, and the estimates were up to twenty times the error. Therefore it is read from the slack and the slip one element further away, on both sides of
+it. Then its error falls smoothly enough. The estimate is at least the difference of the two readings. If the stick zone is only a few nodes
+wide (mu = .1 in the plane), the estimate is this difference alone.
 
 {{effectivity}}
 
-The pressure of a flat punch is infinite at its edge: asked for, it is refused after one solve in these words: "the largest
-pressure is at the edge of the contact surface, a corner, where no mesh bounds it". Every other quantity of a corner converges; one that
-does not is given up when two refinements in a row change it by as much as the one before.
+The pressure of a flat punch is infinite at its edge. If it is asked for, contactopt refuses it after one solve, in these words: "the largest
+pressure is at the edge of the contact surface, a corner, where no mesh bounds it". Every other quantity of a corner converges. A quantity
+that does not converge is given up when two refinements in a row change it by as much as the one before.
 
 ## Hertz within .1 % on less than 5,000 unknowns
 
-Half-space of 100 half-widths, graded by h_next / h = exp((2.8 / n) min(1 + r/a, 100)^.3), zone loop on. The peak is that of a
-polynomial in the coordinates through p^2, weighted by areas, over half of the contact. The node on the axis reads low because the
-hoop strain u_r / r is poorly resolved in the first ring, an error of that ring alone; its area is next to nothing and
-so is its weight.
+The half-space is 100 half-widths large. Its mesh grows by h_next / h = exp((2.8 / n) min(1 + r/a, 100)^.3), and the zone loop, which puts a node
+on the edge of the contact, is on. The peak is that of a polynomial in the coordinates, fitted to p^2 over half of the contact with the areas as
+weights. The pressure at the node on the axis is too low, because the hoop strain u_r / r is poorly resolved in the first ring. This error is that of one ring
+alone. Its area is next to nothing, and so is its weight.
 
 {{hertz}}
 
-The named scene `sphere` (finite bodies, 400 mm, a / R = .055), peak pressure to 1 %: all solves with meshing and assembly, {sphere:.2f} s together.
+The next table has the named scene `sphere` (finite bodies, 400 mm, a / R = .055), and its peak pressure to 1 %. All solves, with meshing and
+assembly, took {sphere:.2f} s together.
 
 {{sphere}}
 
-Figure `parsimony`: grading and zone loop on and off; fastest of three runs. Uniform blocks are 12 half-widths large, all they can afford: their size is the
-error that stays. Without the loop a zone 1.25 times too wide is meshed.
+The figure `parsimony` shows what grading and the zone loop are worth, each switched on and off. Times are the fastest of three runs. Uniform blocks are
+12 half-widths large, because larger ones would have too many elements. The error that stays is that of their size. Without the loop, a zone that is 1.25 times too wide is
+meshed.
 
 ## Rigid punch with Coulomb friction
 
-The named scenes at their defaults, against the coupled exact values; absolute error of c / a.
+The named scenes at their defaults are compared with the exact values of the coupled problem. The error of c / a is absolute.
 
 {{stick}}
 
-Near nu = .5 linear elements lock, and friction depends on what is left of compressibility (Dundurs' beta): the same punch with linear
-displacements, all elements halved.
+If nu comes near .5, linear elements lock. Friction then depends on what is left of the compressibility (Dundurs' beta). The next table has the same punch
+with linear displacements, and all elements halved.
 
 {{locking}}
 
 ## Cattaneo and Mindlin
 
-From `python -m experiments.questions.cattaneo` (nu = 0 in 3D).
+These rows come from `python -m experiments.questions.cattaneo` (nu = 0 in 3D).
 
 {{cattaneo}}
 
 ## Orders of convergence
 
-An elastic square punch on a body of its own material; exponents from `contactopt.analytic.corner`. Orders are means over the two finest
-halvings (uniform) or the finest (graded: nodes at (i/n)^{grading} from the corner). On symmetric problems the approach
-under a given force errs by the square of the energy norm, which is how the norm on graded meshes is read. With friction the
-problem is not symmetric: the dual problem slips the other way, so that the force should converge with the exponent of mu plus that of
--mu once the meshes are fine enough; the theory column has twice the exponent of mu.
+An elastic square punch is pressed on a body of its own material. The exponents of the stress at its corner come from `contactopt.analytic.corner`. The orders
+are means over the two finest halvings of uniform meshes, or over the finest halving of graded ones (nodes at (i/n)^{grading} from the corner).
+
+On symmetric problems the error of the approach under a given force is the square of the error in the energy norm. The norm on graded meshes is read in
+this way. With friction the problem is not symmetric, because the dual problem slips the other way. Once the meshes are fine enough, the force should
+converge with the sum of the exponents of mu and of -mu. The column of the theory has twice the exponent of mu.
 
 {{orders}}
 
 ## A block for a half-space
 
-Deviation from a block of 10,000 half-widths on meshes alike ({size_elements} elements across the half-width); c / a of a flat strip,
-mu = .3, absolute. Pressure and width of round contacts need 100 half-widths for 1e-4, c / a of a strip 10,000: a clamped block holds back the sideways
-displacement by a strain of order a / size. With growth that rises outwards ten times the size costs a few rows of elements.
-The approach of a point contact lacks C force / (E* size) with C = {factor:.3f} for a clamped square block, nu = .3, whatever presses on it (from
-the size of 100, applied to the others: last but one column, error against Hertz). In plane strain the approach has no limit. The rule: 10,000 half-widths,
-or 100 where only pressure and width are asked for.
+How large must a block be to stand for a half-space? The table has the deviation from a block of 10,000 half-widths with a similar mesh ({size_elements} elements
+across the half-width). For a flat strip it has the absolute deviation of c / a, with mu = .3.
+
+The pressure and the width of round contacts need 100 half-widths for 1e-4. The ratio c / a of a strip needs 10,000, because a clamped block holds back
+the sideways displacement by a strain of order a / size. If the elements grow outwards, ten times the size costs a few more rows of
+elements.
+
+The approach of a point contact is too small by C force / (E* size). For a clamped square block with nu = .3 this constant is C = {factor:.3f}, whatever presses
+on it. (It was found from the size of 100 and applied to the other sizes. The last column but one has the error against Hertz that remains.) In plane strain
+the approach has no limit. The rule is to take 10,000 half-widths, or 100 if only pressure and width are asked for.
 
 {{finite}}
 """

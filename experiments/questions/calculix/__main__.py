@@ -130,9 +130,9 @@ def decay(sweep: list[dict[str, Any]], law: str) -> str:
     best = min(good, key=lambda row: row["normal, L2"])
     cut = [f"{row['factor']:.0e}" for row in good if row["attempts"] > 1]
     lost = [f"{row['factor']:.0e}" for row in sweep if row["contact"] == law and row["end"] != "converged"]
-    text = f"{law} like factor^{slope:.2f} from 10 to 1e5, least {best['normal, L2']:.0e} at {best['factor']:.0e}"
-    text += f", more than one attempt at {', '.join(cut)}" if cut else ""
-    return text + (f", no convergence at {', '.join(lost)}" if lost else ", converged at every factor")
+    text = f"With {law} contact it falls like factor^{slope:.2f} from 10 to 1e5, and is least at {best['factor']:.0e}, {best['normal, L2']:.0e}."
+    text += f" ccx needed more than one attempt at {' and '.join(cut)}." if cut else ""
+    return text + (f" It did not converge at {' and '.join(lost)}." if lost else " It converged at every factor.")
 
 
 def findings(check: dict[str, Any], sweep: list[dict[str, Any]], cost: list[dict[str, Any]]) -> str:
@@ -146,60 +146,67 @@ def findings(check: dict[str, Any], sweep: list[dict[str, Any]], cost: list[dict
     same = max(row["same law"] for row in converged(sweep, "node-to-surface"))
     size = max(row["contacts"] for row in cost)
     own, *others = (row for row in cost if row["contacts"] == size)
-    prices = "; ".join(
-        f"{row['solver'].removeprefix('ccx, ')} {row['over contactopt']:.0f} times as long, {row['iterations']} "
-        f"iterations, {row['memory [MB]']:.0f} MB"
+    prices = " ".join(
+        f"ccx with {row['solver'].removeprefix('ccx, ')} contact takes {row['over contactopt']:.0f} times as long, {row['iterations']} "
+        f"iterations and {row['memory [MB]']:.0f} MB."
         for row in others
     )
-    return f"""1. **Two independent codes agree.** Bonded, all displacements differ by {check["displacements, largest difference"]:.0e} of the largest: mesh,
+    return f"""1. **Two independent codes agree.** For bonded bodies all displacements differ by {check["displacements, largest difference"]:.0e} of the largest: mesh,
    thickness, supports and load are the same. With friction and ccx's mortar contact, hard and without a normal factor,
    {agreement}. Node-to-surface penalty, put into contactopt as a compliance
    added to Q, gives the same forces to {same:.0e} wherever ccx converged.
-2. **A penalty trades accuracy for convergence.** L2 error of the normal forces: {"; ".join(decay(sweep, law) for law in DECADES)}.
+2. **A penalty trades accuracy for convergence.** This is about the L2 error of the normal forces. {" ".join(decay(sweep, law) for law in DECADES)}
    contactopt has no factor to choose.
-3. **Cost.** At {size} contacts contactopt takes {own["seconds"]:.2g} s, {own["iterations"]} iterations, {own["memory [MB]"]:.0f} MB, Python included; ccx: {prices}.
-   Each iteration of ccx factorises both bodies anew, each of contactopt solves a dense system of the contact unknowns alone."""
+3. **Cost.** At {size} contacts contactopt takes {own["seconds"]:.2g} s, {own["iterations"]} iterations and {own["memory [MB]"]:.0f} MB, with Python. {prices}
+   Each iteration of ccx factorises both bodies anew. Each iteration of contactopt solves a dense system of the contact unknowns alone."""
 
 
 TEXT = """{findings}
 
-The scene is the 2D punch (half model, plane strain, rigid plate glued to its top under 100 N, foundation clamped below),
-mu = {mu}, {contacts} contacts, in CalculiX {version} on the very same nodes and elements, by a deck written from the meshes.
-CPE4 is expanded by ccx into one layer of bricks C3D8 as thick as the section: full integration, no incompatible modes, hence
-our bilinear element; mortar contact needs these bricks written out. The material is stiff (E = {modulus:g} MPa): contactopt's
-forces do not depend on E, and a strain of 1e-7 keeps apart what ccx does to displaced surfaces, which the third table shows.
-One static step, full load in one increment unless ccx cuts it, down to {least:g} of the load; its default criteria. The upper body
-is the slave; the master is the foundation's whole top, for nodes slide over the edge of a master as wide as the punch.
-Nodal forces are integrated from the stresses that ccx prints with seven digits, whatever its contact law; contactopt is
-solved to a certificate of 1e-11.
+**The scene.** It is the 2D punch: half a model in plane strain, with a rigid plate that is glued to its top and pressed with 100 N. The foundation
+is clamped below. mu = {mu}, and there are {contacts} contacts. CalculiX {version} (called ccx below) has the very same nodes and elements, by a deck that is written from
+the meshes. It expands its element CPE4 into one layer of bricks C3D8 that is as thick as the section. With full integration and no
+incompatible modes, this is our bilinear element. Mortar contact needs these bricks written out in the deck.
 
-Bonded, without contact; differences relative to the largest value:
+The material is stiff (E = {modulus:g} MPa). The forces of contactopt do not depend on E. With strains of 1e-7 the comparison does not depend
+on what ccx does to displaced surfaces, which the third table shows. There is one static step with the full load in one increment. ccx may cut
+it down to {least:g} of the load, by its default criteria. The upper body is the slave. The master is the whole top of the foundation, because
+nodes would slide over the edge of a master that is as wide as the punch. For every contact law the nodal forces are integrated from
+the stresses that ccx prints with seven digits. contactopt solves to a certificate of 1e-11.
+
+**Bonded, without contact.** The differences are relative to the largest value:
 
 {{linear}}
 
-Penalty stiffness K = factor E / h, stick slope K / 10, which is what the manual advises; mortar: no normal factor, stick slope
-{rigid:.0e} E / h. Differences of nodal forces from contactopt, largest over the peak and in L2; `force` is the relative error
-of the total normal force (equilibrium), `approach` that of the plate's displacement, `overlap` the largest penetration over the
-approach; `same law`: from contactopt with the compliances of the same penalty added to Q, the larger of normal and tangential.
-`attempts` at increments of the load, failed ones included, which ccx repeats or cuts; `iterations` of all of them.
+**With contact.** The penalty stiffness is K = factor E / h, and the stick slope is K / 10, which the manual advises. Mortar contact has no normal
+factor, and its stick slope is {rigid:.0e} E / h. The table has the differences of the nodal forces from those of contactopt: the largest one over
+the peak, and the one in L2. The other columns are:
+
+- `force`: the relative error of the total normal force, which is an error of equilibrium;
+- `approach`: the relative error of the plate's displacement;
+- `overlap`: the largest penetration over the approach;
+- `same law`: the difference from contactopt when the compliances of the same penalty are added to Q, the larger of normal and tangential;
+- `attempts`: attempts at increments of the load, with the failed ones, which ccx repeats or cuts;
+- `iterations`: those of all attempts.
 
 {{rows}}
 
-The same with softer bodies, L2 differences at factor 1e3: those of node-to-surface contact grow with the displacements, even
-without NLGEOM, which suggests that its normals turn with the surfaces; surface-to-surface and mortar contact do not depend
-on them, nor does contactopt.
+**Softer bodies.** The table has the same L2 differences at the factor 1e3. Those of node-to-surface contact grow with the displacements, even
+without NLGEOM. This suggests that its normals turn with the surfaces. Surface-to-surface contact, mortar contact and contactopt do
+not depend on the displacements.
 
 {{strain}}
 
-Time and memory, medians of {repeats} runs in turn on one thread; the ratio is the median of the ratios. ccx at the most accurate
-factor of the second table at which one attempt was enough. Its time is the one that it states, without the start of
-the process but with reading the deck and writing the results; contactopt's covers meshes, assembly, reduction, solution and
-stresses, without importing Python packages. Memory is the peak of the process, of ccx or of Python with all packages that contactopt loads.
+**Time and memory.** The table has medians of {repeats} runs in turn on one thread. The ratio is the median of the ratios. ccx runs at the
+most accurate factor of the second table at which one attempt was enough. Its time is the one that it states. It leaves out the start
+of the process, and includes reading the deck and writing the results. The time of contactopt covers meshes, assembly, reduction,
+solution and stresses. It leaves out the import of Python packages. The memory is the peak of the process: of ccx, or of Python with all
+packages that contactopt loads.
 
 {{costs}}
 
-Massless contact of ccx is for explicit dynamics only, so it has no row. What a deck must respect here: ccx {version} does not
-return from mortar contact where a slave node is held in two directions, so a stiff spring holds one of them.
+**What was left out.** Massless contact of ccx is for explicit dynamics only, so it has no row. ccx {version} does not return from mortar
+contact if a slave node is held in two directions. Therefore a stiff spring holds one of them.
 """
 
 

@@ -14,19 +14,20 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 from experiments.questions.nonmatching import accuracy, beside, cost, exact  # noqa: E402
 from experiments.report import merged, write  # noqa: E402
 
-TEXT = """Mortar coupling with dual multipliers (contactopt/interface/mortar.py), chosen by itself where nodes do not match. `a:b` are the
-elements of the upper and the lower body across the contact half-width; the finer side carries the contacts unless a
-column says otherwise.
+TEXT = """How accurate is contact between meshes whose nodes do not match? contactopt chooses a mortar coupling with dual multipliers for them
+(`contactopt/interface/mortar.py`). In the tables `a:b` are the numbers of elements of the upper and of the lower body across the contact
+half-width. The finer side carries the contacts, unless a column says otherwise.
 
 ## Exact to rounding
 
-Uniform pressure across the interface, blocks with quadrilaterals or bricks, ratios of the spacings; the largest relative error of
-the pressure at any contact, whichever side carries them:
+A uniform pressure crosses the interface between blocks of quadrilaterals or bricks. The last three columns are ratios of the spacings. The table has
+the largest relative error of the pressure at any contact, whichever side carries the contacts:
 
 {patch}
 
-Sum of all nodal forces on both bodies, and of their moments, over the sum of the contact forces' sizes and the extent of the
-bodies: of the solution, and of random contact forces on the same curved surfaces (none on planes of symmetry):
+The next table has the sum of all nodal forces on both bodies, and of their moments. Both are relative to the sum of the sizes of the
+contact forces and to the extent of the bodies. The columns `solved` are for the solution. The columns `random forces` are for random
+contact forces on the same curved surfaces, with none on planes of symmetry:
 
 {equilibrium}
 
@@ -36,51 +37,54 @@ The elastic punch (mu = .2, 32:48) in other units:
 
 ## Against exact solutions
 
-Hertz, line and point. `p in L2` is the error at the contacts, with their areas, over the norm:
+The first table has Hertz contact, of a line and of a point. `p in L2` is the error of the pressure at the contacts, weighted with their areas, over the norm
+of the pressure:
 
 {hertz}
 
-Lame's press fit (a quarter, interference 1/200 of the radius; isoparametric elements if quadratic), with the true circles known.
-There is no friction in the exact solution, whatever mu; `friction, largest` is that of any contact, over the pressure:
+The second table has Lame's press fit: a quarter of it, with an interference of 1/200 of the radius. Quadratic elements are isoparametric, and the
+true circles are known. There is no friction in the exact solution, whatever mu is. `friction, largest` is the largest friction of any contact, over the
+pressure:
 
 {press_fits}
 
-The rigid punch on a half-space (Spence), 64 elements across, quadratic: the named scene, whose punch needs no mesh, and the same
-with an elastic punch 1e7 times as stiff, whose mesh does not match:
+The third table has the rigid punch on a half-space (Spence), with 64 quadratic elements across. It compares the named scene, whose punch
+needs no mesh, with an elastic punch that is 1e7 times as stiff and has a mesh that does not match:
 
 {rigid_punch}
 
-Cattaneo and Mindlin: cylinders pressed, then sheared in one step; root mean squares over shears, and their ratios to those of
-matching meshes of 20:20. Where the meshes have nodes at the edges of stick (three shears, each with its meshes), matching nodes turn
-this to account, because both bodies have the same kinks there, and the fine side does not. Nodes anywhere: four shears on
-meshes made for another one.
+The fourth table has Cattaneo and Mindlin: cylinders are pressed, and then sheared in one step. Errors are root mean squares over several shears, with
+their ratios to those of matching meshes of 20:20. In some rows the meshes have nodes at the edges of stick (three shears, each with its
+own meshes). Matching nodes gain from this, because both bodies have their kinks there, and a finer side does not. In the rows
+`anywhere` there are four shears, on meshes that were made for another shear.
 
 {cattaneo}
 
-The same in space, a sphere of linear bricks, pressed by 100 N and sheared by 30 N in one step:
+The same in three dimensions, for a sphere of linear bricks that is pressed by 100 N and sheared by 30 N in one step:
 
 {solids}
 
 ## The elastic punch
 
-mu = .2; root mean squares of the errors of the force between the axis and a place, over its largest value, against matching
-meshes of {fine} quadrilaterals of the same degree:
+Here mu = .2. The error is that of the force between the axis and a place, over its largest value. The table has its root mean square. The
+reference has matching meshes of {fine} quadrilaterals of the same degree:
 
 {elastic_punch}
 
 ## Cost
 
-From assembled bodies to certified forces (residual 1e-8) over one direct solve of the same two bodies tied together by the same
-mortar matrices, SuperLU, medians of {repeats} runs in turn on a machine with much other work; the second ratio counts CPU seconds of
-both threads. Meshes, assembly and the coupling itself come before both and are counted in neither:
+The time from assembled bodies to certified forces (residual 1e-8) is compared with that of one direct solve of the same two bodies, tied
+together by the same mortar matrices. The solver is SuperLU. Times are medians of {repeats} runs in turn, on a machine with much other
+work. The second ratio counts the CPU seconds of both threads. Meshes, assembly and the making of the coupling come before both, and
+are counted in neither:
 
 {costs}
 
 ## CalculiX beside
 
-The elastic punch with 48:32 linear elements, E = 5e5, in CalculiX on the same meshes: mortar contact (hard), and
-surface-to-surface penalty (1e3 E / h). Differences are of nodal forces from contactopt's, in L2, relative, on the contact
-nodes of each body; times are those of one run, for contactopt with meshes and assembly, for ccx as it states them.
+The elastic punch has 48:32 linear elements and E = 5e5. CalculiX (ccx) has the same meshes, with hard mortar contact and with surface-to-surface
+penalty contact (1e3 E / h). The table has the relative differences of its nodal forces from those of contactopt, in L2, on the contact nodes of each
+body. Times are those of one run. The time of contactopt includes meshes and assembly, and the time of ccx is the one that it states.
 
 {beside}
 """

@@ -3,6 +3,8 @@
     orders         the flat punch with its singular corners: energy and approach against the number of unknowns
     hertz          a cylinder on a block, meshed by Gmsh without knowledge of the contact: unknowns for 1 % and .1 % of the
                    exact peak pressure, refined locally and everywhere
+    hertz3d        a ball on a block, tetrahedra by Gmsh without knowledge of the contact: the peak pressure
+    stress         the largest stress of parts meshed by Gmsh: unknowns and time for 1 %, refined locally and everywhere
     effectivity    estimated error over true error on many scenes and quantities, the truth from much finer meshes
     chart          error against time on one scene: uniform, graded by hand, adaptive, half-space
 
@@ -28,9 +30,12 @@ import numpy as np
 
 from contactopt import HalfSpace, Material, Part, Plate, Rigid, Scene, Support, analytic, load_mesh
 from contactopt.adaptivity import refine_locally
+from contactopt.analysis.limits import Limits
 from contactopt.analysis.quantities import peak_pressure
 from contactopt.analysis.solve_scene import solve_scene
 from contactopt.scenes import make_scene
+from experiments.questions.adaptivity.parts import bearing, bracket, pin_in_bush
+from experiments.questions.adaptivity.stress import hertz3d, locally, stress
 from experiments.report import REPORTS, write
 
 RUBBER, STEEL = Material(5.0, 0.3), Material(210e3, 0.3)
@@ -45,9 +50,9 @@ def slope(x: list[float], y: list[float]) -> float:
 def orders() -> list[dict[str, Any]]:
     """Error in the energy norm of the flat punch, as the square root of the missing energy over the whole energy."""
     rows = []
-    truth = refine_locally(make_scene("punch-2d", degree=2), "energy", 2e-7, max_unknowns=60_000)[1].extrapolated
+    truth = refine_locally(make_scene("punch-2d", degree=2), "energy", 2e-7, limits=Limits(60_000))[1].extrapolated
     for degree, goal in ((1, 4e-4), (2, 3e-6)):
-        estimate = refine_locally(make_scene("punch-2d", degree=degree), "energy", goal, max_unknowns=100_000)[1]
+        estimate = refine_locally(make_scene("punch-2d", degree=degree), "energy", goal, limits=Limits(100_000))[1]
         kept = [level for level in estimate.levels if 1_000 <= level.unknowns <= 100_000]
         errors = [np.sqrt(abs(1 - level.value / truth)) for level in kept]
         rows += [
@@ -153,20 +158,20 @@ def cylinder(size: float, force: float) -> tuple[Scene, analytic.Reference]:
 
 
 def hertz() -> list[dict[str, Any]]:
-    """Unknowns and seconds until the peak pressure stays within 1 % and .1 % of Hertz's."""
+    """Unknowns and processor seconds until the peak pressure stays within 1 % and .1 % of Hertz's."""
     rows = []
     for degree in (1, 2):
         scene, exact = cylinder(6.0, 1000.0)
         scene = replace(scene, degree=degree)
-        estimate = refine_locally(scene, "pressure", 3e-4, max_unknowns=20_000)[1]
-        found = [(level.unknowns, level.value / exact.peak - 1, level.seconds) for level in estimate.levels]
+        local, _ = locally(scene, "pressure", 3e-4, 20_000)
+        found = [(unknowns, value / exact.peak - 1, seconds) for unknowns, value, _, seconds in local]
         rows += [row for bound in (1e-2, 1e-3) for row in _reached("adaptive", degree, bound, found)]
         everywhere = []
         for size in (6.0, 3.0, 1.5, 0.75, 0.375, 0.1875)[: 6 if degree == 1 else 5]:
-            begin = time.perf_counter()
+            begin = time.process_time()
             solved = solve_scene(replace(cylinder(size, 1000.0)[0], degree=degree))
             value = peak_pressure(solved.reduction, solved.solution)
-            everywhere.append((solved.reduction.dofs, value / exact.peak - 1, time.perf_counter() - begin))
+            everywhere.append((solved.reduction.dofs, value / exact.peak - 1, time.process_time() - begin))
         rows += [row for bound in (1e-2, 1e-3) for row in _reached("everywhere", degree, bound, everywhere)]
     return rows
 
@@ -178,12 +183,12 @@ def _reached(how: str, degree: int, bound: float, found: list[tuple[int, float, 
     row = {"refined": how, "degree": degree, "error of the peak at most": bound}
     if first < len(found):
         unknowns, error, seconds = found[first]
-        yield row | {"unknowns": unknowns, "its error": error, "seconds with all levels": seconds}
+        yield row | {"unknowns": unknowns, "its error": error, "processor seconds with all levels": seconds}
     else:
         yield row | {
             "unknowns": f"> {found[-1][0]}",
             "its error": found[-1][1],
-            "seconds with all levels": found[-1][2],
+            "processor seconds with all levels": found[-1][2],
         }
 
 
@@ -230,24 +235,30 @@ def effectivity() -> list[dict[str, Any]]:
         "cylinder from Gmsh": (cylinder(6.0, 1000.0)[0], ("energy", "approach", "pressure")),
         "stamp from Gmsh": (stamp(8.0), ("energy", "approach")),
         "tall stamp from Gmsh": (stamp(20.0), ("energy", "approach")),
+        "bracket on a block": (bracket(), ("von_mises:bracket:fillet", "stress_xx:block@20,-5", "energy")),
+        "bearing from files": (bearing(), ("von_mises:bearing:fillet", "stress_yy:bearing@0,20")),
+        "pin in a bush": (pin_in_bush(), ("von_mises:bush", "pressure@0,-20")),
     }
     rows = []
     for name, (scene, quantities) in scenes.items():
         for quantity in quantities:
-            best = refine_locally(scene, quantity, 1e-5, max_unknowns=30_000)[1]
-            for level in best.levels[1:]:
-                true = abs(level.value / best.extrapolated - 1)
-                if true > 5 * abs(best.value / best.extrapolated - 1) and level.unknowns < 8_000:
-                    rows.append(
-                        {
-                            "scene": name,
-                            "quantity": quantity,
-                            "unknowns": level.unknowns,
-                            "estimated": level.error,
-                            "true": true,
-                            "effectivity": level.error / true,
-                        }
-                    )
+            best = refine_locally(scene, quantity, 1e-5, limits=Limits(30_000))[1]
+            truth, last = best.extrapolated, abs(best.value / best.extrapolated - 1)
+            errors = [level.value / truth - 1 for level in best.levels]
+            for n, (level, true) in enumerate(zip(best.levels, errors)):
+                if n == 0 or abs(true) <= 5 * last or level.unknowns >= 8_000:
+                    continue
+                rows.append(
+                    {
+                        "scene": name,
+                        "quantity": quantity,
+                        "unknowns": level.unknowns,
+                        "estimated": level.error,
+                        "true": true,
+                        "effectivity": level.error / abs(true),
+                        "passes through zero": bool(true * errors[n - 1] < 0 or true * errors[n + 1] < 0),
+                    }
+                )
     return rows
 
 
@@ -285,7 +296,7 @@ def chart() -> list[dict[str, Any]]:
         scene = replace(block(rename(coarse, bottom="y-", top="y+")), degree=degree)
         for goal in (3e-2, 1e-2, 3e-3, 1e-3):
             begin = time.process_time()
-            solved, estimate = refine_locally(scene, "pressure", goal, max_unknowns=60_000)
+            solved, estimate = refine_locally(scene, "pressure", goal, limits=Limits(60_000))
             error = estimate.value / exact.peak - 1
             rows.append(_point(f"adaptive, degree {degree}", solved.reduction.dofs, error, time.process_time() - begin))
     for n in (32, 64, 128, 256, 512):
@@ -302,6 +313,8 @@ def _point(how: str, unknowns: int, error: float, seconds: float) -> dict[str, A
 PARTS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "orders": orders,
     "hertz": hertz,
+    "hertz3d": hertz3d,
+    "stress": stress,
     "effectivity": effectivity,
     "chart": chart,
 }
@@ -325,6 +338,15 @@ def report(tables: dict[str, list[dict[str, Any]]]) -> None:
             )
     values = [row["effectivity"] for row in tables["effectivity"]]
     good = sum(0.5 <= value <= 4 for value in values)
+    apart = [row["effectivity"] for row in tables["effectivity"] if not row["passes through zero"]]
+    fine = sum(0.5 <= value <= 4 for value in apart)
+    bearing_rows = [row for row in tables["effectivity"] if row["quantity"] == "von_mises:bearing:fillet"]
+    early = next(row["unknowns"] for row in bearing_rows if row["estimated"] <= 0.01)
+    late = next(
+        row["unknowns"]
+        for row in tables["stress"]
+        if (row["part"], row["degree"], row["refined"]) == ("bearing from files", 1, "adaptive")
+    )
     text = f"""{__doc__.split(chr(10))[0]}
 
 ## The flat punch and its corners
@@ -341,10 +363,31 @@ table names the first mesh from which on the error of the peak pressure stays wi
 
 {{hertz}}
 
+## A ball on a block
+
+A steel ball of radius 20 mm on a steel block, a quarter of both, meshed by Gmsh with tetrahedra of 7 mm; the contact has a radius
+of 1 mm, so that on the first mesh one node carries all of the force.
+
+{{hertz3d}}
+
+## Stress at a fillet and under a pin
+
+A bracket with a fillet of 4 mm held on a block by a bolt, a pin in a bush, and a bearing on the ground with its pin from a scene
+file with three mesh files; all meshes are made by Gmsh with elements of one size. The table names the first mesh from which on the
+error stays within 1 %. Refined everywhere, Gmsh halves the size of all elements; its own time is not counted. The reference
+is the extrapolated value of local refinement with quadratic elements to an estimated error of 1e-4. Times are processor seconds.
+
+{{stress}}
+
 ## Is the estimate honest?
 
 Estimated over true error for {len(values)} meshes; {good} of them lie between .5 and 4. The true error is that to the
-extrapolated value of a much finer mesh of the same sequence.
+extrapolated value of a much finer mesh of the same sequence. A value that passes through the true one between two meshes has
+a small true error by chance, which no estimate knows of: without the meshes next to such a passage, {fine} of {len(apart)}
+lie between .5 and 4. Estimates below the true error: {sum(value < 1 for value in values)} of {len(values)}, by more than a
+factor of two: {sum(value < 0.5 for value in values)}. So the estimate is no bound. All meshes of this table have linear elements and
+are compared with their own sequence. On the bearing the estimate for the fillet is below 1 % from {early} unknowns on, but {late}
+are needed until linear elements stay within 1 % of the reference of quadratic ones in the table above.
 
 {{effectivity}}
 

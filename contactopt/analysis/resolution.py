@@ -1,0 +1,48 @@
+"""Whether the mesh resolves the contact at all: remarks for people, on answers whose certificate says nothing of the mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactopt.analysis.resultants import views
+from contactopt.analysis.status import contact_status
+from contactopt.interface.reduction import Reduction
+from contactopt.problem import Solution
+
+FEWEST = (
+    4  # elements across the half-width of contact; with so few the largest pressure is some percent off (reports/hertz)
+)
+
+
+def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
+    """One sentence for every pair of surfaces whose zone of contact is smaller than the mesh can show.
+
+    A zone that ends by itself and has fewer contacts than a disc or strip of FEWEST elements across its half-width is told.
+    A surface that touches as a whole has no such zone.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    tuple of str
+        Full sentences; empty if every zone is resolved, and for solutions that are not certified.
+    """
+    if not solution.solved:
+        return ()
+    found = []
+    for view, own in views(reduction, solution):
+        problem, name = view.problem, view.problem.pairs[0].name
+        touching = int(contact_status(problem, own.reactions).touching.sum())
+        images = 2 ** int(np.sum(problem.chart.mirrored))
+        strip = 2 * FEWEST if problem.dim == 2 else np.pi * FEWEST**2
+        if 0 < touching < problem.contacts and touching * images < strip:
+            found.append(
+                f"too few contacts of '{name}' touch, {touching} of {problem.contacts}, to show how the pressure is distributed: "
+                "refine the meshes there, or ask for an accuracy."
+            )
+    return tuple(found)

@@ -1,0 +1,194 @@
+"""Half-spaces instead of bodies that are large beside their contact.
+
+One coarse solve gives the half-width a of the contact, the total force, and the gap about it, which a polynomial of the distance
+continues. Two errors remain for the peak pressure, both measured on Hertz's contact (contactopt.analysis.simplest.constants): that of
+a body that ends at the distance L from the contact, FINITE (a / L)^2, and that of a surface that is not flat, STEEP times the square of
+its slope at the edge of the contact. The approach is not the same: it depends on the whole bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from contactopt.analysis.simplest.constants import ACROSS, FINITE, REACH, STEEP
+from contactopt.analysis.simplest.regions import region
+from contactopt.analysis.solve_scene import Solved
+from contactopt.analysis.status import contact_status
+from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
+
+FLAT = 0.95  # cosine between the contact normals inside the contact and their mean, at least
+RINGS = 2.0  # contact half-widths about the middle whose gaps the polynomial follows
+FEWEST = 4  # contacts inside the contact for its shape to be known
+ROUGH = 0.02  # of the indentation: how well the polynomial must follow the gap
+SMALL = 1e-6  # tangential force over the normal one that counts as none
+ALL = 64  # sides of each size among which the nearest one is looked for
+AROUND = 0.5  # cosine to the normal of the contact from which on a side belongs to the surface about it
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """The contact as a coarse solve shows it.
+
+    half_width  of the contact [length];   force  total normal force;  shear  total tangential forces (dim - 1,) on the upper body, along the tangents
+    gap         the initial gap as a function of the distance from the middle (in 2D the place along the line)
+    size        distance from the contact to the nearest end of an elastic body [length]
+    slope       of the gap at the edge of the contact [-];   misfit  of the gap over the indentation [-]
+    """
+
+    half_width: float
+    force: float
+    shear: np.ndarray
+    gap: Callable[[np.ndarray], np.ndarray]
+    size: float
+    slope: float
+    misfit: float
+
+    @property
+    def error(self) -> float:
+        """Estimated relative error of the peak pressure."""
+        return FINITE * (self.half_width / self.size) ** 2 + STEEP * self.slope**2 + self.misfit
+
+
+def spot_of(solved: Solved) -> Spot | str:
+    """The contact of a solved scene, or half a sentence that says why it is none of half-spaces."""
+    scene, problem = solved.reduction.scene, solved.reduction.problem
+    if len(scene.pairs) != 1 or any(isinstance(part, HalfSpace) for part in scene.parts):
+        return "it is offered for one pair of surfaces of bodies with meshes"
+    if callable(scene.pairs[0].mu) or np.ndim(scene.pairs[0].mu):
+        return "the friction depends on the place"
+    if scene.pairs[0].law not in ("coulomb", "frictionless"):
+        return f"the law '{scene.pairs[0].law}' binds all of the surface"
+    r = solved.solution.reactions
+    touching = contact_status(problem, r).touching
+    if touching.sum() < FEWEST:
+        return "the mesh is too coarse to show the shape of the contact"
+    if touching.all() or problem.chart.closed:
+        return "the contact fills all of its surface, so that its edge is that of a body"
+    frames = solved.reduction.frames
+    mean = problem.areas @ frames[:, 0]
+    mean = mean / np.linalg.norm(mean)
+    if np.any(frames[touching, 0] @ mean < FLAT):
+        return "the surfaces turn by too much inside the contact"
+    return _spot(solved, touching, mean)
+
+
+def _spot(solved: Solved, touching: np.ndarray, mean: np.ndarray) -> Spot | str:
+    reduction, problem, r = solved.reduction, solved.reduction.problem, solved.solution.reactions
+    places, number = problem.chart.images()
+    weight = r[number, 0] / np.maximum(problem.areas[number], 1e-300)
+    share = problem.areas[number] * weight
+    middle = places @ share / share.sum()
+    distance = np.linalg.norm(places - middle[:, None], axis=0)
+    half_width = float(distance[touching[number]].max())
+    if not 0 < half_width < 0.95 * distance.max():
+        return "the contact reaches to the end of its surface"
+    fitted = _gap(distance, reduction.gap[number], half_width)
+    if isinstance(fitted, str):
+        return fitted
+    gap, slope, misfit = fitted
+    size = _size(solved, touching)
+    force = float(r[:, 0].sum())
+    shear = np.where(problem.chart.mirrored, 0.0, r[:, 1:].sum(axis=0))  # that of mirror images cancels
+    return Spot(half_width, force, shear, gap, size, slope, misfit)
+
+
+def _gap(
+    distance: np.ndarray, gap: np.ndarray, a: float
+) -> tuple[Callable[[np.ndarray], np.ndarray], float, float] | str:
+    """An even polynomial of fourth degree through the gap within RINGS half-widths, its slope at the edge, its misfit."""
+    near = distance <= RINGS * a
+    s = distance[near] / a
+    terms = np.stack([np.ones_like(s), s**2, s**4], axis=1)
+    if len(np.unique(np.round(s, 6))) < 5:
+        return "the mesh is too coarse to show the gap about the contact"
+    c, *_ = np.linalg.lstsq(terms, gap[near], rcond=None)
+    if c[1] <= 0:
+        return "the gap does not grow from the middle of the contact"
+    indentation = float(c[1] + c[2])
+    misfit = float(np.abs(terms @ c - gap[near]).max() / max(2 * indentation, 1e-300))
+    if misfit > ROUGH:
+        return "the gap about the contact is no smooth function of the distance from its middle"
+
+    def function(d: np.ndarray) -> np.ndarray:
+        return np.asarray(c[1] * (d / a) ** 2 + c[2] * (d / a) ** 4)
+
+    return function, float(2 * c[1] + 4 * c[2]) / a, misfit
+
+
+def _size(solved: Solved, touching: np.ndarray) -> float:
+    """Distance from the contact to the nearest side of an elastic body that does not go on from its surface [length]."""
+    reduction = solved.reduction
+    centre = reduction.problem.coordinates[:, touching].mean(axis=1, keepdims=True)
+    least = np.inf
+    planes = [plane for made in reduction.couplings for plane in made.planes]
+    scene = reduction.scene
+    for part in (part for part in scene.parts if isinstance(part, Part)):
+        mesh = part.build_mesh(scene.elements, scene.zone)
+        surface = np.concatenate([mesh.boundaries[name] for name in scene.surfaces_of(part)])
+        facets = np.setdiff1d(mesh.boundary_facets(), surface)
+        middles = mesh.p[:, mesh.facets[:, facets]].mean(axis=1)
+        around = np.sum(outward(mesh, facets) * outward(mesh, surface).mean(axis=1)[:, None], axis=0) > AROUND
+        for plane in planes:
+            around |= plane.contains(middles, float(np.ptp(mesh.p, axis=1).max()))
+        if not around.all():
+            apart, _ = region(mesh, facets[~around]).distance(centre, ALL)
+            least = min(least, float(apart[0]))
+    return float(least)
+
+
+def _part(scene: Scene, name: str) -> Any:
+    return next(part for part in scene.parts if part.name == name)
+
+
+def outward(mesh: Any, facets: np.ndarray) -> np.ndarray:
+    """Outward unit normals (dim, m) of boundary facets."""
+    corners = mesh.p[:, mesh.facets[:, facets]]
+    edges = corners[:, 1:] - corners[:, :1]
+    across = np.stack([edges[1, 0], -edges[0, 0]]) if len(corners) == 2 else np.cross(edges[:, 0], edges[:, 1], axis=0)
+    inside = mesh.p[:, mesh.t[:, mesh.f2t[0, facets]]].mean(axis=1)
+    sense = np.sign(np.sum(across * (corners.mean(axis=1) - inside), axis=0))
+    return np.asarray(across * sense / np.linalg.norm(across, axis=0))
+
+
+def as_half_spaces(scene: Scene, spot: Spot) -> Scene:
+    """The contact between half-spaces, with the same materials, friction and total force, in axes of its own."""
+    dim = 2 if scene.kind == "plane-strain" else 3
+    components = ("x", "y", "z")
+    reach = REACH * spot.half_width
+
+    def points(elements: int, zone: float | None) -> tuple[np.ndarray, ...]:
+        count = 2 * int(np.ceil(REACH * elements))
+        row = (np.arange(count) + 0.5) * (2 * reach / count) - reach
+        return (row,) * (dim - 1)
+
+    def gap(x: np.ndarray) -> np.ndarray:
+        return spot.gap(np.linalg.norm(x[: dim - 1], axis=0))
+
+    pair = scene.pairs[0]
+    upper, lower = (_part(scene, name) for name in pair.bodies)
+    total = {components[dim - 1]: -spot.force}
+    if np.linalg.norm(spot.shear) > SMALL * spot.force:
+        total |= {name: -float(value) for name, value in zip(components, spot.shear)}
+    top: Any = Rigid(upper.name, gap=gap, force=total)
+    bottom: Any = Rigid(lower.name, gap=gap)
+    if isinstance(lower, Part):
+        bottom = HalfSpace(lower.name, lower.material, points)
+    if isinstance(upper, Part):
+        height = (lambda x: -gap(x)) if isinstance(lower, Part) else None  # a rigid body has the gap itself
+        top = HalfSpace(upper.name, upper.material, points, height=height, force=total)
+    return Scene(
+        f"{scene.name} as half-spaces",
+        top,
+        bottom,
+        pair.mu,
+        kind="plane-strain" if dim == 2 else "solid",
+        thickness=scene.thickness,
+        law=pair.law,
+        elements=ACROSS[dim],
+        units=scene.units,
+        reference=scene.reference,
+    )

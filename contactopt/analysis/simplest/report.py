@@ -1,0 +1,122 @@
+"""What may be left out of a scene, as a report with the simplified scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from contactopt.analysis.solve_scene import Solved
+from contactopt.cards import card, count, line
+from contactopt.errors import InputError
+from contactopt.scenes.scene import Scene
+
+PARTS = {2: "half", 4: "quarter", 8: "eighth"}
+ROUNDING = 1e-10  # a smaller change between two solutions is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Simplification:
+    """Something that may be left out of a scene.
+
+    name      'plane strain', 'axisymmetry', 'mirror symmetry', 'half-spaces', 'tied contacts' or 'frictionless contacts'
+    what      one sentence that says what is left out
+    why       one or two sentences that say why, and how the error is known
+    exact     whether the smaller scene has the answer of the whole one; only what the meshes differ in remains then
+    error     relative error that it makes, None where it is not known: where the mesh is cut, or has to be made anew
+    before, after   (unknowns, contacts that are not tied) of the scene that it is applied to, and of the simplified one, counted from their meshes
+    scene     the simplified scene; None where the mesh has to be made anew by hand
+    check     function of the solved simplified scene that says in a sentence whether what was assumed holds; None where
+              nothing was assumed
+    """
+
+    name: str
+    what: str
+    why: str
+    exact: bool
+    error: float | None
+    before: tuple[int, int]
+    after: tuple[int, int] | None = None
+    scene: Scene | None = field(default=None, repr=False)
+    check: Callable[[Solved], str] | None = field(default=None, repr=False)
+
+    @property
+    def price(self) -> str:
+        """What it leaves, and what the error is, in words."""
+        if self.exact:
+            error = "no error" if self.error == 0 else "no error but that of the mesh"
+        elif self.error is None:
+            error = "error not known"
+        else:
+            error = f"error about {self.error:.1e}" if self.error > ROUNDING else "no error on the coarse mesh"
+        if self.after is None:
+            return error
+        (n, k), (m, c) = self.before, self.after
+        return f"{n} -> {count(m, 'unknown')}, {k} -> {count(c, 'contact')}, {error}"
+
+    def __repr__(self) -> str:
+        return line("Simplification", self.name, self.price)
+
+
+@dataclass(frozen=True, eq=False)
+class Simplified:
+    """What simplify() found.
+
+    given    the scene that was asked about
+    scene    the scene after all exact simplifications, one after the other; the given one if there are none
+    found    the simplifications; the exact ones come first, and each begins with the scene that the one before leaves. The
+             others begin with `scene`
+    notes    sentences about what nearly was a simplification, and what spoils it
+    """
+
+    given: Scene
+    scene: Scene
+    found: tuple[Simplification, ...]
+    notes: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Simplification:
+        """The last simplification of that name, which contains those before it."""
+        for each in reversed(self.found):
+            if each.name == name:
+                return each
+        known = ", ".join(dict.fromkeys(each.name for each in self.found)) or "none"
+        raise InputError(f"scene '{self.given.name}' has no simplification {name!r}; found were: {known}.")
+
+    @property
+    def needs(self) -> str:
+        """One sentence: what is enough for this scene."""
+        exact = [each for each in self.found if each.exact and each.scene is not None]
+        if not exact:
+            return f"Scene '{self.given.name}' needs all of its model: nothing can be left out exactly."
+        unknowns, contacts = exact[-1].after or exact[-1].before
+        first = exact[0].before
+        return (
+            f"Scene '{self.given.name}' needs no more than {_model(self.given, self.scene)}: "
+            f"{count(unknowns, 'unknown')} instead of {first[0]}, {count(contacts, 'contact')} instead of {first[1]}."
+        )
+
+    def __str__(self) -> str:
+        lines = [self.needs]
+        for each in self.found:
+            lines += ["", f"{each.name}: {each.what}", f"  {each.why}", f"  {each.price}"]
+            if each.scene is None:
+                lines[-1] += "; make this mesh anew to apply it"
+        return "\n".join([*lines, *(["", *self.notes] if self.notes else [])])
+
+    def __repr__(self) -> str:
+        return line("Simplified", self.given.name, *(f"{each.name} ({each.price})" for each in self.found))
+
+    def _repr_html_(self) -> str:
+        rows: dict[str, object] = {}
+        for number, each in enumerate(self.found, 1):
+            rows[f"{number}. {each.name}"] = f"{each.what} {each.why} {each.price}."
+        rows |= {f"note {number}": note for number, note in enumerate(self.notes, 1)}
+        return card(self.needs, rows)
+
+
+def _model(given: Scene, scene: Scene) -> str:
+    """'one quarter of the bodies', 'one half of a section in plane strain'."""
+    whole = "what is modelled" if given.copies > 1 else "the bodies"
+    if scene.kind != given.kind:
+        whole = {"plane-strain": "a section in plane strain"}.get(scene.kind, "an axisymmetric section")
+    part = PARTS.get(scene.copies // given.copies)
+    return f"one {part} of {whole}" if part else whole

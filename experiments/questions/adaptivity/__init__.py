@@ -1,0 +1,1 @@
+"""How many unknowns does an accuracy need? Run with `python -m experiments.questions.adaptivity`."""

@@ -1,0 +1,144 @@
+"""Error of the peak pressure against processor time on one scene, for four ways to model it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from contactopt import HalfSpace, Part, Rigid, Scene, Support, analytic
+from contactopt.adaptivity import refine_locally
+from contactopt.analysis.quantities import peak_pressure
+from contactopt.analysis.solve_scene import solve_scene
+from contactopt.scenes.common import RUBBER
+from contactopt.scenes.meshes import contact_grid, graded, rename, tensor_mesh
+
+Row = dict[str, Any]
+
+RADIUS, FORCES = 400.0, (0.8, 0.9, 1.0, 1.1, 1.2)  # the errors of one force alone can be small by luck
+EXACT = {force: analytic.hertz_line(force, RADIUS, analytic.contact_modulus(RUBBER)) for force in FORCES}
+A = EXACT[1.0].half_width
+SIZE = 60 * A  # half-width and depth of the block
+DEGREE = 2  # of the finite elements
+UNIFORM = (64, 128, 192, 256)  # elements across the block
+GRADED = (3, 6, 12, 24)  # elements across the contact half-width
+GOALS = (3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4)  # of adaptive refinement
+POINTS = (16, 32, 64, 128, 256)  # of a half-plane
+
+Answer = tuple[int, float]  # unknowns, peak pressure
+
+
+def block(mesh: Any, force: float) -> Scene:
+    """A rigid cylinder on a block that is clamped below."""
+    named = rename(mesh, bottom="y-", top="y+")
+    part = Part("block", named, RUBBER, (Support("bottom"),), contact="top")
+    return Scene("cylinder on a block", _cylinder(force), part, 0.0, law="frictionless", degree=DEGREE)
+
+
+def _cylinder(force: float) -> Rigid:
+    return Rigid("cylinder", gap=lambda p: p[0] ** 2 / (2 * RADIUS), force={"y": -force})
+
+
+def uniform(count: float, force: float) -> Answer:
+    """Squares of one size everywhere."""
+    ticks = np.linspace(-SIZE, SIZE, int(count) + 1), np.linspace(-SIZE, 0, int(count) // 2 + 1)
+    return solved(block(tensor_mesh(*ticks), force))
+
+
+def graded_by_hand(count: float, force: float) -> Answer:
+    """Squares on the contact, growing away from it; the finer they are, the more slowly they grow."""
+    growth = 1 + 1.6 / count
+    side = contact_grid(1.5 * A, round(1.5 * count), SIZE, growth)
+    mesh = tensor_mesh(np.concatenate([-side[:0:-1], side]), -graded(SIZE, A / count, growth)[::-1])
+    return solved(block(mesh, force))
+
+
+def half_plane(count: float, force: float) -> Answer:
+    """No mesh: points across three contact half-widths."""
+    x = (np.arange(count) + 0.5) * 3 * A / count - 1.5 * A
+    plane = HalfSpace("block", RUBBER, x, depth=SIZE)
+    return solved(Scene("cylinder", _cylinder(force), plane, 0.0, law="frictionless"))
+
+
+def solved(scene: Scene) -> Answer:
+    """Unknowns and peak pressure."""
+    found = solve_scene(scene)
+    return found.reduction.dofs, peak_pressure(found.reduction, found.solution)
+
+
+def adaptive(goal: float, force: float) -> Answer:
+    """The last of the meshes that refinement makes, from a coarse one on; the time is that of all of them."""
+    coarse = tensor_mesh(np.linspace(-SIZE, SIZE, 17), np.linspace(-SIZE, 0, 9))
+    found, estimate = refine_locally(block(coarse, force), "pressure", goal, max_unknowns=60_000)
+    return found.reduction.dofs, estimate.value
+
+
+WAYS: dict[str, tuple[Callable[[float, float], Answer], tuple[float, ...]]] = {
+    "half-plane": (half_plane, POINTS),
+    "graded": (graded_by_hand, GRADED),
+    "adaptive": (adaptive, GOALS),
+    "uniform": (uniform, UNIFORM),
+}
+
+
+def chart_rows() -> list[Row]:
+    """One row for every setting of every way: root mean square of the errors, least of the seconds over all forces."""
+    rows = []
+    for way, (run, settings) in WAYS.items():
+        run(settings[0], 1.0)  # imports and caches do not count
+        for setting in settings:
+            errors, seconds, unknowns = [], [], []
+            for force in FORCES:
+                begin = time.process_time()
+                size, value = run(setting, force)
+                seconds.append(time.process_time() - begin)
+                errors.append(value / EXACT[force].peak - 1)
+                unknowns.append(size)
+            row = {"model": way, "setting": setting, "unknowns": round(float(np.median(unknowns)))}
+            row |= {"error of the peak": float(np.sqrt(np.mean(np.square(errors))))}
+            rows.append(row | {"processor seconds": min(seconds)})
+            print(rows[-1], flush=True)
+    return rows
+
+
+def bias() -> float:
+    """By how much the peak pressure of the block misses that of a half-plane, on the finest graded mesh."""
+    return graded_by_hand(GRADED[-1], 1.0)[1] / EXACT[1.0].peak - 1
+
+
+LABELS = {"half-plane": (0, 1.0, 1.3), "graded": (1, 1.1, 1.1), "adaptive": (0, 1.1, 1.15), "uniform": (0, 1.12, 1.15)}
+COLOURS = {"half-plane": "#0072b2", "graded": "#009e73", "adaptive": "#d55e00", "uniform": "#555555"}
+NAMES = {
+    "half-plane": "half-plane, no mesh",
+    "graded": "graded by hand",
+    "adaptive": "adaptive",
+    "uniform": "uniform",
+}
+
+
+def draw_chart(rows: list[Row], model_error: float) -> Figure:
+    """Error over time, each way named at its curve."""
+    made = Figure(figsize=(7.2, 4.4), layout="constrained")
+    ax = made.subplots()
+    for way, colour in COLOURS.items():
+        own = [row for row in rows if row["model"] == way]
+        x, y = [row["processor seconds"] for row in own], [row["error of the peak"] for row in own]
+        ax.loglog(x, y, "o-", color=colour)
+        point, right, up = LABELS[way]
+        ax.annotate(NAMES[way], (x[point] * right, y[point] * up), color=colour, va="bottom")
+    ax.axhline(model_error, color="#999999", linestyle=":", linewidth=1)
+    ax.annotate(
+        "what the end of the block changes",
+        (0.98, model_error),
+        xycoords=("axes fraction", "data"),
+        color="#777777",
+        ha="right",
+        va="top",
+    )
+    ax.set(xlabel="processor time [s]", ylabel="error of the peak pressure [-]")
+    ax.set_title("A rigid cylinder on an elastic block, against Hertz", loc="left")
+    ax.spines[["top", "right"]].set_visible(False)
+    return made
