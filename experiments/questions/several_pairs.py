@@ -118,7 +118,8 @@ the forces that the free motions of bodies held by contact alone can bear. Every
 ## Towers of cubes
 
 Cubes of unequal stiffness on each other; the ratio of stiffness alternates from cube to cube, and so does Poisson's ratio. The worst
-condition number is {condition:.1f}, the most iterations are {iterations}; {above} of {rows} rows are above 10 or above 30 iterations.
+condition number is {condition:.1f}, the most iterations are {iterations}. Above 10 or above 30 iterations are {above} of {rows} rows:
+{which}, the first of them that of the stiffer body.
 
 {{blocks}}
 
@@ -146,10 +147,14 @@ def main() -> None:
     names = ("neumann", "laplacian")
     conditions = [max(row[f"{name}: condition"] for name in names) for row in blocks]
     steps = [max(row[f"{name}: iterations"] for name in names) for row in blocks]
+    above = [row for row, c, n in zip(blocks, conditions, steps) if c > 10 or n > 30]
+    kinds = sorted({(row["ratio"], row["Poisson's ratios"]) for row in above})
+    which = [f"ratio {ratio:g} and Poisson's ratios {poissons}" for ratio, poissons in kinds]
     text = TEXT.format(
         condition=max(conditions),
         iterations=max(steps),
-        above=sum(c > 10 or n > 30 for c, n in zip(conditions, steps)),
+        above=len(above),
+        which="; ".join(which) or "none",
         rows=len(blocks),
     )
     tables = {"blocks": blocks, "slices": slices}
