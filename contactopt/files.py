@@ -1,8 +1,12 @@
-"""Files that appear complete or not at all, and one sentence for the user where they cannot be written."""
+"""Files that appear complete or not at all, and one sentence for the user where they cannot be written.
+
+Also pipes to other processes, which may be dead when one writes to them.
+"""
 
 from __future__ import annotations
 
 import os
+import signal
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -161,3 +165,25 @@ def remove_files(folder: Path, names: Iterable[str]) -> None:
         check_name("the file", name)
         with suppress(FileNotFoundError, NotADirectoryError):
             (folder / name).unlink()
+
+
+@contextmanager
+def broken_pipe_is_an_error() -> Iterator[None]:
+    """Let writing to a dead process raise an exception, as Python has it, also where a library changed that.
+
+    Gmsh, for one, sets the signal of a broken pipe back to its default, which ends the whole process without a word.
+
+    Returns
+    -------
+    context manager
+        Within it, a broken pipe raises BrokenPipeError.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGPIPE})
+    try:
+        yield
+    finally:
+        signal.sigtimedwait({signal.SIGPIPE}, 0)
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)

@@ -6,6 +6,7 @@ import pickle
 import resource
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -21,6 +22,7 @@ from contactopt.benchmark.experiment import read_experiment
 from contactopt.benchmark.report import page_of, read_layout
 from contactopt.benchmark.store import lines
 from contactopt.cli import main
+from contactopt.solving.backends import child
 from tests.test_benchmark import SMALL, count, run, written
 
 BAD_NAMES = [
@@ -646,3 +648,20 @@ def test_a_plug_in_counts_for_the_registry_that_runs_its_file(tmp_path):
     names = {}
     exec(compile(file.read_text(), file, "exec"), names)
     assert callable(names["mine"]) and second.find("mine") is None and list(first.methods) == ["mine"]
+
+
+def test_writing_to_a_dead_process_is_an_error_whatever_a_library_did_to_the_signal():
+    ours, theirs = socket.socketpair()
+    theirs.close()
+    before = signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # as gmsh leaves it: a broken pipe would end this process
+    try:
+        with pytest.raises(OSError):
+            wire.Channel(ours).send("word" * 10_000)
+        process = subprocess.Popen([sys.executable, "-c", ""], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        process.stdin.write(b"word")  # stays in the buffer until the pipe is closed
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+        child._stop(process)
+    finally:
+        signal.signal(signal.SIGPIPE, before)
+        ours.close()
+    assert process.stdin.closed

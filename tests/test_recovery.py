@@ -76,7 +76,7 @@ def test_the_recovered_stress_converges_faster_than_averages(degree):
         wanted = 2 * shear * xx + lam * (xx + yy)
         found = stress_map(body, Region())
         errors["fit"].append(np.abs(found.stress(U)[:, 0] - wanted[found.sources]).max())
-        errors["average"].append(np.abs(nodal_stress(body, U)[0, 0] - wanted).max())
+        errors["average"].append(np.abs(nodal_stress(body, U, everywhere=False)[0, 0] - wanted).max())
     assert errors["fit"][1] < 0.6 * errors["average"][1]
     assert errors["fit"][0] / errors["fit"][1] > 1.8 * degree
 

@@ -7,6 +7,7 @@ import meshio
 import numpy as np
 import pytest
 import skfem
+import skfem.io.meshio
 from conftest import MATERIAL
 
 import contactopt

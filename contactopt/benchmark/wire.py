@@ -15,6 +15,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from contactopt.files import broken_pipe_is_an_error
+
 HEAD = 8  # bytes, in which each message tells its length
 BLOCK = 1 << 20  # bytes read at a time
 BEAT = 0.5  # s between two looks whether the process at the other end still lives
@@ -36,11 +38,12 @@ class Channel:
         data = pickle.dumps(message, protocol=5)
         self.end.settimeout(seconds)
         head = len(data).to_bytes(HEAD, "big")
-        if len(data) > BLOCK:
-            self.end.sendall(head)
-            self.end.sendall(data)
-        else:
-            self.end.sendall(head + data)
+        with broken_pipe_is_an_error():
+            if len(data) > BLOCK:
+                self.end.sendall(head)
+                self.end.sendall(data)
+            else:
+                self.end.sendall(head + data)
 
     def receive(self, deadline: float, most: float, alive: Callable[[], bool]) -> bytes:
         """The next message, not longer than `most` bytes, until `deadline` on the monotonic clock.

@@ -56,7 +56,7 @@ class StressMap:
 
     places: np.ndarray
     sources: np.ndarray
-    fit: Fit
+    fit: PatchFit
     used: np.ndarray
     body: Assembly
     basis: skfem.CellBasis
@@ -277,7 +277,7 @@ def _terms(dim: int, degree: int) -> list[tuple[int, ...]]:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class PatchFit:
     """The least-squares fits around m places.
 
     row      (p,) the place to which each point of a patch belongs;   column  (p,) its number among all points
@@ -305,7 +305,7 @@ class Fit:
         return np.asarray(np.sqrt(np.maximum(self.inverse[:, 0, 0], 0.0) * variance))
 
 
-def _fit(offset: np.ndarray, row: np.ndarray, column: np.ndarray, count: int, terms: list[tuple[int, ...]]) -> Fit:
+def _fit(offset: np.ndarray, row: np.ndarray, column: np.ndarray, count: int, terms: list[tuple[int, ...]]) -> PatchFit:
     """The fits of points at `offset` (dim, p) from the places to which `row` says they belong."""
     size = np.zeros(count)
     np.maximum.at(size, row, np.linalg.norm(offset, axis=0))
@@ -315,7 +315,7 @@ def _fit(offset: np.ndarray, row: np.ndarray, column: np.ndarray, count: int, te
     for i, first in enumerate(powers):
         for j, second in enumerate(powers[: i + 1]):
             moments[:, i, j] = moments[:, j, i] = np.bincount(row, first * second, count)
-    return Fit(row, column, powers.T, np.linalg.pinv(moments, rcond=1e-10, hermitian=True))
+    return PatchFit(row, column, powers.T, np.linalg.pinv(moments, rcond=1e-10, hermitian=True))
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:

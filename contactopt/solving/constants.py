@@ -10,6 +10,7 @@ from __future__ import annotations
 # The default method (contactopt.solving.methods.auto): when one stage gives way to the next.
 NEWTON_STEPS = 25  # of Newton's method, whose last ones converge quadratically
 PATIENCE = 6  # Newton steps without progress
+FEW_ENTRIES = 5000  # unknowns of an operator up to which its entries are asked for as soon as there is no progress
 PROGRESS = 0.9  # a residual that falls by less than this factor is no progress
 CONE_PROGRAMS = 5  # of the fixed point of Acary and Cadoux
 CLOSE = 1e-3  # error of an interior point from which the proximal loop finds the last digits

@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import os
 import pickle
-import signal
 import subprocess
 import sys
 import weakref
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from math import isfinite
 from threading import Timer
 from typing import Any
 
 from contactopt.errors import BackendError
+from contactopt.files import broken_pipe_is_an_error
 from contactopt.solving.backends import Backend
 from contactopt.solving.deadline import TimeUp, check_time, time_left
 
@@ -72,7 +71,7 @@ class Child:
         end = Timer(time_left(), process.kill)
         end.start()
         try:
-            with _broken_pipe_is_an_error():
+            with broken_pipe_is_an_error():
                 pickle.dump((arguments, name, start, settings), process.stdin)
                 process.stdin.flush()
             answer = pickle.load(process.stdout)
@@ -89,23 +88,6 @@ class Child:
         return answer
 
 
-@contextmanager
-def _broken_pipe_is_an_error() -> Iterator[None]:
-    """Writing to a process that was killed raises an exception, as Python has it, also where a library changed that.
-
-    Gmsh, for one, sets the signal of a broken pipe back to its default, which ends the whole process without a word.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGPIPE})
-    try:
-        yield
-    finally:
-        signal.sigtimedwait({signal.SIGPIPE}, 0)
-        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-
-
 def _started() -> subprocess.Popen[bytes]:
     """A new process that waits for programs."""
     return subprocess.Popen(
@@ -120,8 +102,8 @@ def _started() -> subprocess.Popen[bytes]:
 def _stop(process: subprocess.Popen[bytes]) -> None:
     """Kill the process and wait for its end."""
     process.kill()
-    for pipe in (process.stdin, process.stdout):
-        with suppress(OSError):
+    for pipe in (process.stdin, process.stdout):  # to close one writes what it still holds
+        with suppress(OSError), broken_pipe_is_an_error():
             if pipe is not None:
                 pipe.close()
     process.wait()

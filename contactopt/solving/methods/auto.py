@@ -36,6 +36,7 @@ from contactopt.problem.operators import InterfaceOperator
 from contactopt.solving.constants import (
     CLOSE,
     CONE_PROGRAMS,
+    FEW_ENTRIES,
     GENTLE_ALPHA,
     LARGER,
     LEAST_ALPHA,
@@ -91,13 +92,18 @@ class Auto:
                 start = yield from self._nested(problem, start)
                 note(logger, "Newton's method on nested grids made no progress; it goes on with the finest grid alone")
             reached = yield from self._newton(problem, start, self.preconditioner)
+            if isinstance(problem.Q, InterfaceOperator):
+                note(
+                    logger,
+                    "Newton's method made no progress with products, so all that follows looks at the entries of Q",
+                )
+                try:
+                    problem = problem.explicit()
+                except InputError as error:
+                    note(logger, f"the default method ends with Newton's steps: {error}")
+                    return
+                reached = yield from self._newton(problem, None, None)  # its steps are exact now
             note(logger, "Newton's method made no progress, so interior points and the proximal loop take over")
-            try:
-                if not sp.issparse(problem.Q):
-                    problem = problem.explicit()  # all that follows looks at the entries of Q
-            except InputError as error:
-                note(logger, f"the default method ends with Newton's steps: {error}")
-                return
         from contactopt.solving.methods.cone import AcaryCadoux
 
         matrix = block_matrix(problem.Q, problem.dim)
@@ -166,7 +172,10 @@ class Auto:
     def _newton(
         problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
     ) -> Generator[Iterate | Known, None, Iterate]:
-        """Newton's iterates; returns the best. What comes next needs the entries of Q: not before they cost no more.
+        """Newton's iterates; returns the best.
+
+        What comes next needs the entries of Q. Where there are many, or bodies are solved by iteration, these are dear, and
+        Newton's method goes on until its own products have cost as much.
 
         A start that leads nowhere is given up for the solution of the bonded problem, from which Newton's method begins
         where it has none.
@@ -182,7 +191,12 @@ class Auto:
                 if residual < best:
                     best, reached = residual, point[:2]
                 tired = since >= PATIENCE or steps >= NEWTON_STEPS
-                if tired and (begin is not None or operator is None or operator.products >= problem.q.size):
+                dear = (
+                    operator is not None
+                    and (operator.coupled is not None or problem.q.size > FEW_ENTRIES)
+                    and operator.products < problem.q.size
+                )
+                if tired and (begin is not None or not dear):
                     break
             if begin is not None:
                 note(logger, "Newton's method made no progress from the given start and begins anew without it")

@@ -256,7 +256,7 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
         The preconditioner, with the model that belongs to it.
     """
     Z, QZ = _orthonormal(Z, np.asarray(Q @ Z))
-    c = _scales(P, Q, QZ)
+    c = _scales(P, Q, QZ) if len(P.blocks) > 1 else _scale(P, Q, Z, QZ)
 
     def apply(x: np.ndarray) -> np.ndarray:
         coarse = Z.T @ x
@@ -282,6 +282,14 @@ def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     kept = values > DEPENDENT
     change = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
     return Z @ change, QZ @ change
+
+
+def _scale(P: Preconditioner, Q: Interface, Z: np.ndarray, QZ: np.ndarray) -> np.ndarray:
+    """The factor (n,) of a P of one block, by a random force x without a part in what is exact: x'Qx over (Qx)'P(Qx)."""
+    x = np.random.default_rng(0).normal(size=len(Z))
+    x -= Z @ (QZ.T @ x)
+    Qx = np.asarray(Q @ x)
+    return np.full(len(Z), float(x @ Qx) / float(Qx @ (P @ Qx)))
 
 
 def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
