@@ -60,7 +60,7 @@ USUAL = (
 OWN_KEYS = ("kind", "caption", "where", "optional")  # of a figure; all others are arguments of its function
 LEFT_OUT = ("key", "label", "base_mb", "history")  # of a report's table
 PAGE = "benchmarks.html"
-DPI, SHADES = 100, 64
+DPI, SHADES = 100, 160
 QUESTIONS = (
     "Which chart answers which question? Speed against accuracy shows what a certified residual costs. A performance profile shows where methods "
     "fail, at its right end, and which is fast, at its left. A table of times by start shows what warm starts buy. A map shows for which numbers a "
