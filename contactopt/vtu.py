@@ -10,8 +10,8 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Mapping
+from html import escape
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -59,5 +59,5 @@ def _array(name: str, values: np.ndarray) -> str:
     text = base64.b64encode(head).decode() + (base64.b64encode(block).decode() if raw else "")
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
     return (
-        f'<DataArray type="{TYPES[values.dtype.name]}" Name={quoteattr(name)}{width} format="binary">{text}</DataArray>'
+        f'<DataArray type="{TYPES[values.dtype.name]}" Name="{escape(name)}"{width} format="binary">{text}</DataArray>'
     )

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import skfem
-from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from contactopt.bodies.elements import is_curved, straight
@@ -228,6 +227,8 @@ class _Piece:
         turns = np.diff(np.unwrap(np.arctan2(*np.diff(nodes, axis=1)[::-1])))
         self.flat = nodes.shape[1] < 3 or bool(np.all(np.abs(turns) < 1e-9))
         closed = nodes.shape[1] > 3 and np.array_equal(nodes[:, 0], nodes[:, -1])
+        from scipy.interpolate import CubicSpline  # a tenth of a second, for curved boundaries only
+
         self.line = CubicSpline(self.arc, nodes.T, bc_type="periodic" if closed else "not-a-knot")
         self.circle = None if self.flat else _circle(nodes)
 
