@@ -104,7 +104,7 @@ def _print_result(result: Any, out: str) -> None:
     steps = count(s["outer_iterations"], "iteration")
     print(f"{s['status']}: {result.solution.message}; {steps}, residual {s['residual']:.1e}")
     if s["q"] == "implicit":
-        print(f"Q by {s['products']} products, never formed")
+        print(f"Q by {s['products']} products with vectors")
     native = s["normal_backend"] == s["tangential_backend"] == NATIVE
     by = f", normal problem by {s['normal_backend']}, tangential by {s['tangential_backend']}"
     print(f"method {s['method']}" + ("" if native else by))
