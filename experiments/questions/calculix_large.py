@@ -133,8 +133,7 @@ def own_run(scene: Scene) -> tuple[dict[str, Any], Reduction, Solution]:
     solution = solve(reduction.problem)
     recover(reduction, solution)
     spent = time.process_time() - begin
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    row = {"end": solution.status.label, "CPU [s]": spent, "iterations": solution.iterations, "memory [MB]": memory}
+    row = {"end": solution.status.label, "CPU [s]": spent, "iterations": solution.iterations, "memory [MB]": ""}
     return row, reduction, solution
 
 
@@ -161,7 +160,8 @@ dimensions. Each code runs once.
 
 The time of contactopt, at its defaults, includes meshes, assembly, reduction, solution and stresses. CalculiX uses its direct solver
 and node-to-surface penalty contact with the factor {factor:.0e}. Its time includes the reading of the deck. Times are CPU seconds,
-because other programs had a share of the machine. If a run was ended at its time limit, the ratio is a lower bound.
+because other programs had a share of the machine. Memory is that of ccx alone: all runs of contactopt share one process. If a
+run was ended at its time limit, the ratio is a lower bound.
 
 {{rows}}
 
