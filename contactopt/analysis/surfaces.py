@@ -15,7 +15,6 @@ from contactopt.interface.recovery import Fields
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution
 from contactopt.scenes.scene import Part
-from contactopt.vtu import write_vtu
 
 NEAR = 1.5  # distances between contacts, beyond the gap, up to which a node of a body belongs to a contact
 CELLS = {2: "line", 3: "triangle", 4: "quad"}  # by their corners
@@ -57,7 +56,10 @@ class ContactFields:
 
     def write_vtu(self, path: Path) -> None:
         """The surface as a VTU file with its quantities at the contacts."""
-        write_vtu(path, self.points.T, CELLS[len(self.cells)], self.cells.T, self.data)
+        import meshio
+
+        points = np.pad(self.points, ((0, 3 - len(self.points)), (0, 0))).T
+        meshio.Mesh(points, [(CELLS[len(self.cells)], self.cells.T)], self.data).write(path, file_format="vtu")
 
 
 def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFields, ...]:

@@ -13,7 +13,6 @@ import skfem
 from contactopt.bodies.body import Assembly
 from contactopt.bodies.elements import SHAPES, elements_of, second_order, straight, weight_at
 from contactopt.material import lame
-from contactopt.vtu import write_vtu
 
 STRESSES = {
     "plane-strain": ("xx", "yy", "zz", "xy"),
@@ -53,10 +52,13 @@ class Fields:
         path
             The file.
         """
+        import meshio
+
         flat = {f"stress_{name}": column for name, column in zip(self.names, self.stress.T)}
         vectors = np.pad(self.displacement, ((0, 3 - len(self.displacement)), (0, 0))).T
         data = {"displacement": vectors, "von_mises": self.von_mises, **flat, **self.contact}
-        write_vtu(path, self.mesh.p.T, *elements_of(self.mesh), data)
+        points = np.pad(self.mesh.p.T, ((0, 0), (0, 3 - len(self.mesh.p))))
+        meshio.Mesh(points, [elements_of(self.mesh)], data).write(path, file_format="vtu")
 
 
 def fields_of(body: Assembly, U: np.ndarray) -> Fields:

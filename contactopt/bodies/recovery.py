@@ -38,7 +38,7 @@ from contactopt.errors import InputError
 from contactopt.material import lame, lame_by_poisson
 
 OUTSIDE = (
-    0.2  # how far beyond an element a point may lie, over the element's size: the arc beyond the edge of a coarse mesh
+    0.2  # how far beyond an element a point may lie, over its size, as an arc lies beyond the edge of a coarse mesh
 )
 POINTS = 1.5  # least number of points in a patch, over the number of coefficients
 

@@ -38,7 +38,6 @@ ROOMS = {
     "solving": "The methods stand here, with the driver that calls them and the parts that they share. Nothing here knows finite elements.",
     "scenes": "A scene says what is modelled: bodies, materials, supports and loads. The named scenes are here too.",
     "models": "The convex programs of the subject are written in cvxpy, as on a blackboard.",
-    "vtu": "Meshes and fields at their nodes are written as VTU files for ParaView.",
     "teaching": "The notebooks of the course share these parts: exercises that grade themselves, and sliders.",
     "fclib": "Problems are exchanged with the FCLib collection.",
     "analytic": "Exact solutions are computed here, to compare the computed ones with.",
