@@ -176,8 +176,8 @@ def exponents(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def draw(rows: list[dict[str, Any]]) -> Figure:
-    figure = Figure(figsize=(10, 3.4), layout="constrained")
-    for ax, key in zip(figure.subplots(1, 4), ("setup [s]", "solve [s]", "memory [MiB]", "iterations")):
+    figure = Figure(figsize=(6.8, 6.4), layout="constrained")
+    for ax, key in zip(figure.subplots(2, 2).ravel(), ("setup [s]", "solve [s]", "memory [MiB]", "iterations")):
         for name, colour in COLOURS.items():
             own = [row for row in rows if row["solver"] == name and row[key]]
             if own:
@@ -188,7 +188,7 @@ def draw(rows: list[dict[str, Any]]) -> Figure:
         else:
             ax.set(yscale="log")
         ax.grid(alpha=0.3)
-    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
     return figure
 
 

@@ -217,9 +217,9 @@ def draw(rows: list[dict]) -> Figure:
     shown = (("sphere", "peak"), ("sphere", "radius"), ("sphere", "approach"))
     shown += (("sphere 3D", "traction"), ("disc", "approach"), ("disc, graded", "approach"))
     names = {"sphere": "sphere, axisymmetric", "sphere 3D": "sphere, 3D", "disc": "flat disc, even elements"}
-    names["disc, graded"] = "flat disc, elements graded to its edge"
-    figure = Figure(figsize=(12, 7.4), layout="constrained")
-    for ax, (case, quantity) in zip(figure.subplots(2, 3).ravel(), shown):
+    names["disc, graded"] = "flat disc, graded elements"
+    figure = Figure(figsize=(7.4, 10.2), layout="constrained")
+    for ax, (case, quantity) in zip(figure.subplots(3, 2).ravel(), shown):
         for (shape, degree), (colour, style) in KINDS.items():
             own = series(rows, case, shape, degree)
             solid = {"Q": "hexahedra", "P": "tetrahedra"} if case.endswith("3D") else {"Q": "quads", "P": "triangles"}

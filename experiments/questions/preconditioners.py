@@ -180,9 +180,9 @@ def seconds(act: Callable[[], object], repeats: int = 7) -> float:
 
 
 def draw(rows: list[dict], sizes: tuple[int, ...], title: str) -> Figure:
-    figure = Figure(figsize=(11, 4.2), layout="constrained")
+    figure = Figure(figsize=(6.4, 8.4), layout="constrained")
     figure.suptitle(title)
-    for ax, key in zip(figure.subplots(1, 2), ("condition, full", "PCG iterations, full")):
+    for ax, key in zip(figure.subplots(2, 1), ("condition, full", "PCG iterations, full")):
         for name, colour in COLOURS.items():
             for suffix, style in (("", "o--"), (", deflated", "s-")):
                 chosen = [row for row in rows if row["preconditioner"] == name + suffix and row[key] != ""]
@@ -200,8 +200,8 @@ def draw(rows: list[dict], sizes: tuple[int, ...], title: str) -> Figure:
 
 
 def draw_costs(rows: list[dict]) -> Figure:
-    figure = Figure(figsize=(11, 4.2), layout="constrained")
-    for ax, kind in zip(figure.subplots(1, 2), ("product", "scene solved")):
+    figure = Figure(figsize=(6.4, 8.4), layout="constrained")
+    for ax, kind in zip(figure.subplots(2, 1), ("product", "scene solved")):
         for dim, style in ((2, "o-"), (3, "s--")):
             chosen = [row for row in rows if row["dim"] == dim]
             for form, colour in (("explicit", ORANGE), ("implicit", BLUE), ("neumann", GREEN)):

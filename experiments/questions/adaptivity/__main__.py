@@ -402,20 +402,20 @@ A rigid cylinder on a block of 80 x 40 contact half-widths; the exact value is t
 
 def picture(tables: dict[str, list[dict[str, Any]]]) -> Any:
     """Error against unknowns for the punch, and against time for the chart."""
-    fig, (left, right) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
+    fig, (upper, lower) = plt.subplots(2, 1, figsize=(6.4, 8), layout="constrained")
     for degree, color in ((1, "C0"), (2, "C1")):
         for mesh, style in (("adaptive", "o-"), ("uniform", "s--")):
             rows = [row for row in tables["orders"] if row["degree"] == degree and row["mesh"] == mesh]
             x, y = [row["unknowns"] for row in rows], [row["error in the energy norm"] for row in rows]
-            left.loglog(x, y, style, color=color, mfc="none", label=f"{mesh}, degree {degree}")
-    left.set(xlabel="unknowns [-]", ylabel="error in the energy norm [-]", title="flat punch")
-    left.legend(frameon=False)
+            upper.loglog(x, y, style, color=color, mfc="none", label=f"{mesh}, degree {degree}")
+    upper.set(xlabel="unknowns [-]", ylabel="error in the energy norm [-]", title="flat punch")
+    upper.legend(frameon=False)
     for number, mesh in enumerate(dict.fromkeys(row["mesh"] for row in tables["chart"])):
         rows = [row for row in tables["chart"] if row["mesh"] == mesh]
         x, y = [row["processor seconds"] for row in rows], [row["error of the peak"] for row in rows]
-        right.loglog(x, y, "o-", color=f"C{number}", mfc="none", label=mesh)
-    right.set(xlabel="processor time [s]", ylabel="error of the peak pressure [-]", title="cylinder on a block")
-    right.legend(frameon=False)
+        lower.loglog(x, y, "o-", color=f"C{number}", mfc="none", label=mesh)
+    lower.set(xlabel="processor time [s]", ylabel="error of the peak pressure [-]", title="cylinder on a block")
+    lower.legend(frameon=False)
     return fig
 
 
