@@ -6,7 +6,6 @@
     hertz3d        a ball on a block, tetrahedra by Gmsh without knowledge of the contact: the peak pressure
     stress         the largest stress of parts meshed by Gmsh: unknowns and time for 1 %, refined locally and everywhere
     effectivity    estimated error over true error on many scenes and quantities, the truth from much finer meshes
-    chart          error against time on one scene: uniform, graded by hand, adaptive, half-space
 
 Run all, or the parts that are named: python -m experiments.questions.adaptivity [PART ...]
 """
@@ -28,7 +27,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from contactopt import HalfSpace, Material, Part, Plate, Rigid, Scene, Support, analytic, load_mesh
+from contactopt import Material, Part, Plate, Scene, Support, analytic, load_mesh
 from contactopt.adaptivity import refine_locally
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.quantities import peak_pressure
@@ -262,61 +261,12 @@ def effectivity() -> list[dict[str, Any]]:
     return rows
 
 
-def chart() -> list[dict[str, Any]]:
-    """Error of the peak pressure against processor seconds: a rigid cylinder on a block, a half-plane where that is enough."""
-    from contactopt.scenes.meshes import graded, rename, tensor_mesh
-
-    force, radius, rubber = 1.0, 400.0, RUBBER
-    exact = analytic.hertz_line(force, radius, analytic.contact_modulus(rubber))
-    a = exact.half_width
-    ball = Rigid("cylinder", gap=lambda p: p[0] ** 2 / (2 * radius), force={"y": -force})
-    rows = []
-
-    def block(mesh: Any) -> Scene:
-        part = Part("block", mesh, rubber, (Support("bottom"),), contact="top")
-        return Scene("cylinder", ball, part, 0.0, law="frictionless")
-
-    def measure(how: str, scene: Scene) -> None:
-        begin = time.process_time()
-        solved = solve_scene(scene)
-        value = peak_pressure(solved.reduction, solved.solution)
-        rows.append(_point(how, solved.reduction.dofs, value / exact.peak - 1, time.process_time() - begin))
-
-    size = 40 * a
-    for n in (64, 128, 256, 512):
-        grid = tensor_mesh(np.linspace(-size, size, n + 1), np.linspace(-size, 0, n // 2 + 1))
-        measure("uniform", block(rename(grid, bottom="y-", top="y+")))
-    for n in (4, 8, 16, 32):
-        h = a / n
-        side = np.concatenate([np.linspace(0, 1.5 * a, int(1.5 * n) + 1), 1.5 * a + graded(size - 1.5 * a, h, 1.2)[1:]])
-        grid = tensor_mesh(np.concatenate([-side[:0:-1], side]), -graded(size, h, 1.2)[::-1])
-        measure("graded by hand", block(rename(grid, bottom="y-", top="y+")))
-    coarse = tensor_mesh(np.linspace(-size, size, 17), np.linspace(-size, 0, 9))
-    for degree in (1, 2):
-        scene = replace(block(rename(coarse, bottom="y-", top="y+")), degree=degree)
-        for goal in (3e-2, 1e-2, 3e-3, 1e-3):
-            begin = time.process_time()
-            solved, estimate = refine_locally(scene, "pressure", goal, limits=Limits(60_000))
-            error = estimate.value / exact.peak - 1
-            rows.append(_point(f"adaptive, degree {degree}", solved.reduction.dofs, error, time.process_time() - begin))
-    for n in (32, 64, 128, 256, 512):
-        x = (np.arange(n) + 0.5) * 3 * a / n - 1.5 * a
-        plane = HalfSpace("block", rubber, x, depth=size)
-        measure("half-plane", Scene("cylinder", ball, plane, 0.0, law="frictionless"))
-    return rows
-
-
-def _point(how: str, unknowns: int, error: float, seconds: float) -> dict[str, Any]:
-    return {"mesh": how, "unknowns": unknowns, "error of the peak": abs(error), "processor seconds": seconds}
-
-
 PARTS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "orders": orders,
     "hertz": hertz,
     "hertz3d": hertz3d,
     "stress": stress,
     "effectivity": effectivity,
-    "chart": chart,
 }
 
 
@@ -352,7 +302,7 @@ def report(tables: dict[str, list[dict[str, Any]]]) -> None:
 ## The flat punch and its corners
 
 The stress is infinite at the edge of the punch. On even meshes that spoils the order of convergence; local refinement restores
-it, -1/2 for linear and -1 for quadratic elements in the number of unknowns. The error is that in the energy norm.
+it: -1/2 in the number of unknowns for linear elements, and -1 for quadratic ones. The error is measured in the energy norm.
 
 {{fits}}
 
@@ -381,42 +331,32 @@ is the extrapolated value of local refinement with quadratic elements to an esti
 
 ## Is the estimate honest?
 
-Estimated over true error for {len(values)} meshes; {good} of them lie between .5 and 4. The true error is that to the
-extrapolated value of a much finer mesh of the same sequence. A value that passes through the true one between two meshes has
-a small true error by chance, which no estimate knows of: without the meshes next to such a passage, {fine} of {len(apart)}
-lie between .5 and 4. Estimates below the true error: {sum(value < 1 for value in values)} of {len(values)}, by more than a
-factor of two: {sum(value < 0.5 for value in values)}. So the estimate is no bound. All meshes of this table have linear elements and
+The effectivity is the estimated error over the true one. It lies between .5 and 4 for {good} of {len(values)} meshes. The true error is
+the difference to the extrapolated value of a much finer mesh of the same sequence. Where the value passes through the true one between
+two meshes, it has a small error by chance, of which no estimate knows. Without the meshes next to such a passage, {fine} of
+{len(apart)} lie between .5 and 4. The estimate is smaller than the true error for {sum(value < 1 for value in values)} meshes, and by more than a
+factor of two for {sum(value < 0.5 for value in values)} of them. So the estimate is no bound. All meshes of this table have linear elements and
 are compared with their own sequence. On the bearing the estimate for the fillet is below 1 % from {early} unknowns on, but {late}
 are needed until linear elements stay within 1 % of the reference of quadratic ones in the table above.
 
 {{effectivity}}
 
-## Speed against accuracy
-
-A rigid cylinder on a block of 80 x 40 contact half-widths; the exact value is that of a half-plane.
-
-{{chart}}
+Error against time, of adaptive meshes and of other models of one scene, is measured by `python -m experiments.questions.simplest`.
 """
     write("adaptivity", "Fewest unknowns for an accuracy", text, tables | {"fits": fits}, {"error": picture(tables)})
 
 
 def picture(tables: dict[str, list[dict[str, Any]]]) -> Any:
-    """Error against unknowns for the punch, and against time for the chart."""
-    fig, (upper, lower) = plt.subplots(2, 1, figsize=(6.4, 8), layout="constrained")
+    """Error against unknowns for the punch."""
+    figure, ax = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
     for degree, color in ((1, "C0"), (2, "C1")):
         for mesh, style in (("adaptive", "o-"), ("uniform", "s--")):
             rows = [row for row in tables["orders"] if row["degree"] == degree and row["mesh"] == mesh]
             x, y = [row["unknowns"] for row in rows], [row["error in the energy norm"] for row in rows]
-            upper.loglog(x, y, style, color=color, mfc="none", label=f"{mesh}, degree {degree}")
-    upper.set(xlabel="unknowns [-]", ylabel="error in the energy norm [-]", title="flat punch")
-    upper.legend(frameon=False)
-    for number, mesh in enumerate(dict.fromkeys(row["mesh"] for row in tables["chart"])):
-        rows = [row for row in tables["chart"] if row["mesh"] == mesh]
-        x, y = [row["processor seconds"] for row in rows], [row["error of the peak"] for row in rows]
-        lower.loglog(x, y, "o-", color=f"C{number}", mfc="none", label=mesh)
-    lower.set(xlabel="processor time [s]", ylabel="error of the peak pressure [-]", title="cylinder on a block")
-    lower.legend(frameon=False)
-    return fig
+            ax.loglog(x, y, style, color=color, mfc="none", label=f"{mesh}, degree {degree}")
+    ax.set(xlabel="unknowns [-]", ylabel="error in the energy norm [-]", title="flat punch")
+    ax.legend(frameon=False)
+    return figure
 
 
 def main(chosen: list[str]) -> None:
