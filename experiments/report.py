@@ -37,9 +37,8 @@ def write(
     text: str,
     tables: dict[str, list[dict[str, Any]]],
     figures: dict[str, Any],
-    page: str = "{name}/report.md",
 ) -> None:
-    """Write reports/name/ and the page. `text` is Markdown in which {table} stands for the table of that name."""
+    """Write reports/name/ with its report. `text` is Markdown in which {table} stands for the table of that name."""
     folder = REPORTS / name
     folder.mkdir(parents=True, exist_ok=True)
     for stem, rows in tables.items():
@@ -51,9 +50,8 @@ def write(
     for stem, figure in figures.items():
         figure.savefig(folder / f"{stem}.png", dpi=120)
     body = text.format(**{stem: markdown(rows) for stem, rows in tables.items()})
-    path = REPORTS / page.format(name=name)
-    home = os.path.relpath(folder, path.parent)
-    pictures = "\n\n".join(f"![{stem}]({os.path.normpath(f'{home}/{stem}.png')})" for stem in figures)
+    path = folder / "report.md"
+    pictures = "\n\n".join(f"![{stem}]({stem}.png)" for stem in figures)
     foot = f"Made by `python -m experiments.questions.{name}`.\nEnvironment: {environment()}."
     path.write_text(f"# {title}\n\n{body}\n\n{pictures}\n\n{foot}\n".replace("\n\n\n\n", "\n\n"))
     print(path.read_text())

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 QUESTIONS = ROOT / "experiments" / "questions"
 MODULES = sorted(path.relative_to(ROOT).with_suffix("").as_posix() for path in QUESTIONS.rglob("*.py"))
-REPORTS = sorted(path for path in (ROOT / "reports").rglob("*.md"))
+REPORTS = sorted(path for path in (ROOT / "reports").glob("*/report.md"))
 
 
 def command(path: Path) -> list[str]:
@@ -32,9 +32,14 @@ def test_the_command_that_a_report_names_exists(path):
         assert (ROOT / "experiments" / "campaigns" / f"{path.parent.name}.toml").exists()
         return
     made_by = command(path)[-1]
-    name = path.parent.name if path.name == "report.md" else path.stem
+    name = path.parent.name
     assert made_by == f"questions.{name}"
     assert (QUESTIONS / f"{name}.py").exists() or (QUESTIONS / name / "__main__.py").exists()
+
+
+def test_the_index_of_the_reports_names_each_of_them():
+    named = re.findall(r"\((\w+)/report\.md\)", (ROOT / "reports" / "README.md").read_text())
+    assert sorted(set(named)) == sorted(path.parent.name for path in REPORTS)
 
 
 def test_a_report_names_the_command_that_writes_it(tmp_path, monkeypatch, capsys):

@@ -1,4 +1,4 @@
-"""Adding a plug-in costs one file and one line: each example of CONTRIBUTING.md is added to a copy of the package and used by its name."""
+"""Adding a plug-in costs one file and one line: each example of the page is added to a copy of the package and used by its name."""
 
 import re
 import shutil
@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-TEXT = (ROOT / "CONTRIBUTING.md").read_text()
+PAGE = ROOT / "experiments" / "site" / "add_a_plug_in.md"
+TEXT = PAGE.read_text()
 # how a table begins in its module; the line of a new entry goes below
 OPENING = r"^{table}\b[^\n]*\{{\n(?:    \w+\.name: \w+\n    for \w+ in \(\n)?"
 
@@ -100,7 +101,7 @@ def test_it_costs_one_file_and_one_line_and_is_used_by_its_name(name, tmp_path):
         assert "solved" in done.stdout
 
 
-def test_every_plug_in_that_contributing_shows_is_added_here():
+def test_every_plug_in_that_the_page_shows_is_added_here():
     sections = re.findall(r"^## (.*)$", TEXT, re.M)
     shown = {title for title in sections if any(head.startswith("in ") for head in blocks(title))}
     assert shown == {kind.section for kind in KINDS.values()}

@@ -149,7 +149,7 @@ def rigid_punch(
     The solution is self-similar as the load grows, so that one static step from the unloaded state is exact. The
     half-space is a block that is clamped below. Its elements shrink to 1e-3 of the half-width towards the edge of the
     punch, where the tractions are singular, and displacements are quadratic. With linear ones and as many unknowns,
-    the stick zone has three times the error (reports/accuracy.md). Lengths are in mm, forces in N and Young's moduli
+    the stick zone has three times the error (reports/accuracy/report.md). Lengths are in mm, forces in N and Young's moduli
     in MPa.
 
     Parameters

@@ -263,7 +263,7 @@ implicit product is one solve with each body, from its factors. An explicit prod
 
 {costs}
 
-Another report measures what a whole frictional solve costs, over one linear solve of the bonded bodies: [the price of friction](cost_ratio/report.md).
+Another report measures what a whole frictional solve costs, over one linear solve of the bonded bodies: [the price of friction](../cost_ratio/report.md).
 """
 
 

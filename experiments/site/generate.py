@@ -74,7 +74,8 @@ def all_pages(site: Path) -> Iterator[tuple[Path, str | Path]]:
     yield Path("command_line.md"), command_line()
     yield from reference.room_pages(ROOT)
     reports = {name_of(path): path for path in sorted((ROOT / "reports").glob("*/report.md"))}
-    reports |= {name_of(path): path for path in sorted((ROOT / "reports").glob("*.md"))}
+    listed = (ROOT / "reports" / "README.md").read_text()
+    yield Path("measured.md"), re.sub(r"\((\w+)/report\.md\)", r"(reports/\1.md)", listed)
     about = [name for name in ACCURACY if name in reports]
     for page, names in (("accuracy", about), ("performance", [name for name in reports if name not in about])):
         text = (site / f"{page}.md").read_text() + "".join(opening(reports[name]) for name in names)
@@ -138,8 +139,8 @@ def command_line() -> str:
 
 
 def name_of(path: Path) -> str:
-    """reports/NAME/report.md or reports/NAME.md -> NAME."""
-    return path.parent.name if path.name == "report.md" else path.stem
+    """reports/NAME/report.md -> NAME."""
+    return path.parent.name
 
 
 def base(path: Path) -> str:

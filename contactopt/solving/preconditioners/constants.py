@@ -8,7 +8,7 @@ EIGENVECTORS was chosen by the times of both ways, `python -m experiments.questi
 of products.
 
 DISPERSION, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the bodies of
-`python -m experiments.questions.preconditioners` (reports/preconditioners.md). On bodies that had no part in that fit, `neumann` is
+`python -m experiments.questions.preconditioners` (reports/preconditioners/report.md). On bodies that had no part in that fit, `neumann` is
 judged by `python -m experiments.questions.preconditioners_unseen` (reports/preconditioners_unseen/report.md).
 
 WAVES and MOST_WAVES were chosen for few iterations on the slices of `python -m experiments.questions.several_pairs`.

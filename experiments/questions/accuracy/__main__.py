@@ -194,7 +194,7 @@ def main() -> None:
         "parsimony": draw_parsimony(curves),
         "orders": draw_orders({name: errors for name, (_, errors) in found.items()}),
     }
-    write("accuracy", "Accuracy and what it costs", text, tables, figures, page="{name}.md")
+    write("accuracy", "Accuracy and what it costs", text, tables, figures)
 
 
 if __name__ == "__main__":
