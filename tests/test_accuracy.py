@@ -12,7 +12,7 @@ from contactopt.analysis.accuracy import MOST_UNKNOWNS, refine, remainder
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.quantities import QUANTITIES, at_rim, peak_pressure
 from contactopt.analysis.zone import solve_zone
-from contactopt.bodies.refinement import split
+from contactopt.bodies.local_refinement import boundary_curves, split
 from contactopt.interface.reduction import reduce_bodies
 from contactopt.material import Material
 from contactopt.scenes.meshes import rename, tensor_mesh
@@ -52,7 +52,7 @@ def test_the_remainder_does_not_trust_luck():
 def test_split_keeps_boundaries_and_puts_nodes_on_the_arc():
     sphere = scenes.sphere()
     coarse = sphere.upper.mesh(8, 20.0)
-    fine = split(coarse, "contact")
+    fine = split(coarse, boundary_curves(coarse))
     assert fine.nelements == 4 * coarse.nelements
     assert set(fine.boundaries) == set(coarse.boundaries)
     nodes = np.unique(fine.facets[:, fine.boundaries["contact"]])
@@ -64,7 +64,7 @@ def test_split_keeps_boundaries_and_puts_nodes_on_the_arc():
 
 def test_split_of_a_flat_mesh_stays_flat():
     mesh = MeshQuad().with_boundaries({"contact": lambda x: x[1] == 0}).refined(2)
-    fine = split(mesh, "contact")
+    fine = split(mesh, {})
     assert np.ptp(fine.p[1, np.unique(fine.facets[:, fine.boundaries["contact"]])]) == 0
 
 

@@ -220,9 +220,7 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
     InputError
         With the name of the first element that is wrong.
     """
-    places = np.asarray(mesh.elem().doflocs).T
-    places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
-    volume = np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1))
+    volume = volumes(mesh)
     size = np.linalg.norm(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** len(mesh.p)
     bad = np.flatnonzero((volume * np.sign(volume[:, -1:])).min(axis=1) <= FLAT * size)
     if len(bad):
@@ -235,6 +233,24 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
             f"mesh file '{cells.path}': more than two elements share a facet, one of them is {cells.name(element)}; "
             "elements must not overlap."
         )
+
+
+def volumes(mesh: skfem.Mesh) -> np.ndarray:
+    """Compute the ratio of volumes between elements and their reference.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh with e elements.
+
+    Returns
+    -------
+    ndarray
+        (e, n + 1) ratios with their signs, at the n nodes of each element and at its centre.
+    """
+    places = np.asarray(mesh.elem().doflocs).T
+    places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
+    return np.asarray(np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1)))
 
 
 def check_surface(path: Path, mesh: skfem.Mesh) -> None:
