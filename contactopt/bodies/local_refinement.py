@@ -32,6 +32,7 @@ FLAT = 0.1  # least share of its volume that an element keeps where its nodes mo
 BENT = 0.15  # sagitta of an edge over its length, beyond which the mesh is too coarse for its curve
 SMALLEST = 1e-10  # size of an element that is not divided any more, over its distance from the origin or the size of the body
 Function = Callable[[np.ndarray], np.ndarray]
+Curves = Mapping[str, Function | None]  # by the name of the boundary; None where it is flat
 
 
 class TooSmall(InputError):
@@ -83,7 +84,7 @@ def simplices(mesh: Any) -> Any:
     return mesh
 
 
-def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Function]) -> Any:
+def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
     """Divide the marked elements of a mesh, and others as far as it takes to stay conforming.
 
     Elements that are as small as rounding allows stay whole. A new node stays on its edge where it would turn an element
@@ -120,7 +121,7 @@ def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Function]) -> Any
     return _refined(mesh, marked[large], curves)
 
 
-def split(mesh: Any, curves: Mapping[str, Function]) -> Any:
+def split(mesh: Any, curves: Curves) -> Any:
     """Halve all elements of a mesh, with new nodes of curved boundaries on their curves.
 
     Parameters
@@ -139,13 +140,13 @@ def split(mesh: Any, curves: Mapping[str, Function]) -> Any:
     return bent(fine, curves) if is_curved(mesh) else fine
 
 
-def _refined(mesh: Any, how: Any, curves: Mapping[str, Function], places: np.ndarray | None = None) -> Any:
+def _refined(mesh: Any, how: Any, curves: Curves, places: np.ndarray | None = None) -> Any:
     """The mesh divided as scikit-fem is told, its new nodes at `places`, if given, and on the curves."""
     with _no_word_of_copies():
         fine = named_like(mesh, replace(mesh, _boundaries=None, _subdomains=None).refined(how))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
     points = fine.p.copy() if places is None else places.copy()
-    for name, curve in curves.items():
+    for name, curve in _present(mesh, curves).items():
         mine = np.intersect1d(new, np.unique(fine.facets[:, facets_of(fine, name)]))
         if len(mine):
             points[:, mine] = curve(points[:, mine])
@@ -157,6 +158,11 @@ def facets_of(mesh: Any, name: str) -> np.ndarray:
     if name:
         return np.asarray(mesh.boundaries[name])
     return np.setdiff1d(mesh.boundary_facets(), np.concatenate([[0][:0], *(mesh.boundaries or {}).values()]))
+
+
+def _present(mesh: Any, curves: Curves) -> dict[str, Function]:
+    """The curves of boundaries that have facets."""
+    return {name: curve for name, curve in curves.items() if curve is not None and len(facets_of(mesh, name))}
 
 
 def _unfolded(mesh: Any, points: np.ndarray) -> Any:
@@ -175,7 +181,7 @@ def _unfolded(mesh: Any, points: np.ndarray) -> Any:
     return replace(mesh, doflocs=points)
 
 
-def bent(mesh: Any, curves: Mapping[str, Function]) -> Any:
+def bent(mesh: Any, curves: Curves) -> Any:
     """Bend the edges and faces of a mesh of straight elements along its curved boundaries.
 
     Elements and named boundaries keep their numbers. An edge that would leave its chord by more than BENT of its length,
@@ -193,7 +199,7 @@ def bent(mesh: Any, curves: Mapping[str, Function]) -> Any:
     mesh
         A mesh of second order, or the same mesh where there is no curve.
     """
-    known = {name: curve for name, curve in curves.items() if len(facets_of(mesh, name))}
+    known = _present(mesh, curves)
     if not known:
         return mesh
     with _no_word_of_copies():

@@ -9,7 +9,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 
-OFF = 1e-2  # how far a node may be from the curve of its boundary, over the size of its facet
+OFF = 2e-2  # how far a node may be from the curve of its boundary, over the size of its facet
 
 
 class Curve:

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import InputError
+from contactopt.scenes.inp import read_inp
 from contactopt.scenes.msh4 import read_msh4, version
 
 MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
@@ -146,6 +147,8 @@ def _read(path: Path) -> Any:
         printed = io.StringIO()
         try:  # on a damaged file readers raise anything, print what is wrong, and end the process
             with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
+                if name == "abaqus":
+                    return read_inp(path)
                 return meshio.read(path, file_format=name) if name in SAFE else _read_apart(path, name, size)
         except (Exception, SystemExit) as error:
             text = printed.getvalue() if isinstance(error, SystemExit) else str(error)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from scipy.spatial import KDTree
 
 from contactopt.errors import InputError
 
-SAME = 1e-6  # nodes this fraction of the smaller element apart are one node
+SAME = 1e-6  # places this fraction of a size apart are one place
+ONE, APART = 1e-4, 1e-3  # nodes are one, or two, if they are less, or more, than this fraction of the shortest edge apart
 FLAT = 1e-10  # an element of less volume, over that of a cube of its size, is degenerate
 CLOSED = 1e-9  # what the normals of a closed surface may sum up to, over its area
 CORNERS = {
@@ -121,26 +123,56 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
     -------
     ndarray
         (n,) numbers of nodes: of each group at one place the first.
+
+    Raises
+    ------
+    InputError
+        If two nodes are so near each other that they may be one or two.
     """
     own = np.arange(cells.points.shape[1])
     used = np.unique(cells.nodes)
-    size = np.linalg.norm(np.ptp(cells.points[:, cells.corners], axis=1), axis=0)
-    smallest = np.full(len(own), np.inf)
-    for row in cells.nodes:
-        np.minimum.at(smallest, row, size)
-    pairs = used[KDTree(cells.points[:, used].T).query_pairs(SAME * size.max(), output_type="ndarray")]
-    apart = np.linalg.norm(cells.points[:, pairs[:, 0]] - cells.points[:, pairs[:, 1]], axis=0)
-    pairs = pairs[apart <= SAME * smallest[pairs].min(axis=1)]
-    if not len(pairs):
+    pairs, distance, edge, size = _near_pairs(cells, used)
+    same = distance <= np.maximum(ONE * edge, SAME * size)
+    unclear = np.flatnonzero(~same & (distance <= APART * edge))
+    if len(unclear):
+        i, j = pairs[unclear[0]]
+        raise InputError(
+            f"mesh file '{cells.path}': nodes {i + 1} and {j + 1}, at ({text(cells.points[:, i])}), are "
+            f"{distance[unclear[0]]:.3g} apart, too far for one node and too near for two; merge such nodes in the file."
+        )
+    if not same.any():
         return own
+    pairs = pairs[same]
     if repair:
-        log.warning("%s: nodes that lie on others are merged with them, the first at (%s); %d pairs",
-                    cells.path, text(cells.points[:, pairs[0, 0]]), len(pairs))  # fmt: skip
+        log.warning("%s: nodes that lie on others are merged with them, the first at (%s); %d pairs, at most %.3g apart",
+                    cells.path, text(cells.points[:, pairs[0, 0]]), len(pairs), distance[same].max())  # fmt: skip
     graph = coo_matrix((np.ones(len(pairs)), pairs.T), (len(own), len(own)))
     label = connected_components(graph, directed=False)[1]
     first = np.full(label.max() + 1, len(own))
     np.minimum.at(first, label, own)
     return np.asarray(first[label])
+
+
+def _near_pairs(cells: Cells, used: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Pairs (m, 2) of nodes that are nearer than elements allow, how far they are apart, and the sizes there.
+
+    These are the length of the shortest edge and the size of the smaller element at the two nodes.
+    """
+    corners = cells.points[:, cells.corners]
+    size = np.linalg.norm(np.ptp(corners, axis=1), axis=0)
+    lengths = [np.linalg.norm(a - b, axis=0) for a, b in combinations(corners.transpose(1, 0, 2), 2)]
+    sizes = np.full((2, cells.points.shape[1]), np.inf)
+    for row in cells.nodes:
+        np.minimum.at(sizes[0], row, np.min(lengths, axis=0))
+        np.minimum.at(sizes[1], row, size)
+    reach = np.maximum(APART * sizes[0], SAME * sizes[1])[used]
+    tree = KDTree(cells.points[:, used].T)
+    crowded = np.flatnonzero(tree.query_ball_point(tree.data, reach, return_length=True) > 1)
+    near = tree.query_ball_point(tree.data[crowded], reach[crowded])
+    found = {(min(i, j), max(i, j)) for i, others in zip(crowded.tolist(), near) for j in others if i != j}
+    pairs = used[np.array(sorted(found), dtype=int).reshape(-1, 2)]
+    distance = np.linalg.norm(cells.points[:, pairs[:, 0]] - cells.points[:, pairs[:, 1]], axis=0)
+    return pairs, distance, *sizes[:, pairs].min(axis=2)
 
 
 def repaired(cells: Cells, merged: np.ndarray) -> Cells:
@@ -268,12 +300,29 @@ def check_surface(path: Path, mesh: skfem.Mesh) -> None:
     InputError
         If they do not, because elements overlap.
     """
-    surface = skfem.FacetBasis(mesh, mesh.elem(), facets=mesh.boundary_facets())
-    total = np.abs((np.asarray(surface.normals) * surface.dx).sum(axis=(1, 2))).max()
-    if total > CLOSED * surface.dx.sum():
+    facets = mesh.boundary_facets()
+    cell = mesh.f2t[0, facets]
+    local = np.argmax(mesh.t2f[:, cell] == facets, axis=0)
+    corners = mesh.p[:, mesh.t[np.array(mesh.refdom.facets)[local].T, cell]]  # in their order around the facet
+    areas = _area_vectors(corners)
+    middle = mesh.p[:, mesh.t[:, cell]].mean(axis=1)
+    areas = areas * np.sign(np.sum(areas * (corners.mean(axis=1) - middle), axis=0))
+    total = np.abs(areas.sum(axis=1)).max()
+    if total > CLOSED * np.linalg.norm(areas, axis=0).sum():
         raise InputError(
             f"mesh file '{path}': the surface of the body is not closed, its normals sum up to {total:.3g}; elements overlap."
         )
+
+
+def _area_vectors(corners: np.ndarray) -> np.ndarray:
+    """Area times normal (dim, f), of either sign, of facets with corners (dim, c, f) in their order."""
+    if len(corners) == 2:
+        x, y = corners[:, 1] - corners[:, 0]
+        return np.stack([y, -x])
+    first, second = corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]
+    if corners.shape[1] == 3:
+        second = corners[:, 1] - corners[:, 0]
+    return np.asarray(np.cross(first, second, axis=0) / 2)
 
 
 def _volumes(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
