@@ -18,7 +18,7 @@ Edges of second order are cut in halves at the nodes within them, which lie on t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -55,17 +55,38 @@ def plane_curves(mesh: Any, arcs: bool) -> dict[str, Curve | None]:
     facets = mesh.boundary_facets()
     edges, points, owner, known = _edges(mesh, facets)
     ends = np.zeros((2, edges.shape[1]))
-    near = _rounding(points[:, np.unique(edges)])
+    near = rounding(points[:, np.unique(edges)])
     for chain, numbers, forward in _chains(edges):
         bends = _bends(points[:, chain], near, arcs and not known)
         ends[:, numbers] = np.where(forward, bends, -bends[::-1])
     found: dict[str, Curve | None] = {}
-    named = np.concatenate([np.zeros(0, int), *(np.asarray(f) for f in (mesh.boundaries or {}).values())])
-    for name, own in {**(mesh.boundaries or {}), "": np.setdiff1d(facets, named)}.items():
-        mine = np.isin(owner, own)
+    for name, label, mine in shares(mesh, owner):
         curved = np.any(ends[:, mine] != 0)
-        found[name] = Curve(_Blends(points[:, edges[:, mine]], ends[:, mine]), known, name) if curved else None
+        found[name] = Curve(_Blends(points[:, edges[:, mine]], ends[:, mine]), known, label) if curved else None
     return found
+
+
+def shares(mesh: Any, owner: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Divide pieces of the surface among the boundaries.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+    owner
+        (t,) the facet of each piece.
+
+    Yields
+    ------
+    tuple
+        The name of a boundary, or '' for what has no name; what messages call its curve; and whether each piece is its own.
+    """
+    left = np.ones(len(owner), dtype=bool)
+    for name, facets in (mesh.boundaries or {}).items():
+        mine = np.isin(owner, facets)
+        left &= ~mine
+        yield name, f"the curve of boundary {name!r}", mine
+    yield "", "the curve of the boundary without a name", left
 
 
 def _edges(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
@@ -81,8 +102,8 @@ def _edges(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     return halves, points, np.tile(facets, 2), True
 
 
-def _rounding(points: np.ndarray) -> float:
-    """How far nodes (2, m) may be from where they belong because a file rounds its numbers [length]."""
+def rounding(points: np.ndarray) -> float:
+    """Find how far nodes (dim, m) may be from where they belong because a file rounds its numbers [length]."""
     size, largest = np.ptp(points, axis=1).max(), np.abs(points).max()
     least = max(EXACT * size, 16 * np.finfo(float).eps * largest)
     if np.array_equal(points, points.astype(np.float32)):

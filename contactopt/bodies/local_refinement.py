@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 from contactopt.bodies.curves import CORNER as CORNER
 from contactopt.bodies.curves import plane_curves
 from contactopt.bodies.elements import CURVED, is_curved, straight
-from contactopt.bodies.facet_surfaces import space_curves
+from contactopt.bodies.facet_surfaces import barycentric, space_curves
 from contactopt.errors import InputError
 from contactopt.scenes.curves import Curve as Curve
 from contactopt.scenes.mesh_repair import volumes
@@ -273,19 +273,6 @@ def named_like(old: Any, new: Any) -> Any:
     centres = new.p[:, new.facets[:, outer]].mean(axis=1)
     count = min(NEAREST, len(facets))
     near = cKDTree(corners.mean(axis=1).T).query(centres.T, k=count)[1].reshape(len(outer), count)
-    parent = facets[near[np.arange(len(outer)), np.argmin(_outside(corners[:, :, near], centres), axis=1)]]
+    parent = facets[near[np.arange(len(outer)), np.argmin(barycentric(corners[:, :, near], centres)[1], axis=1)]]
     names = {name: outer[np.isin(parent, members)] for name, members in old.boundaries.items()}
     return replace(new, _boundaries={name: np.sort(members).astype(np.int32) for name, members in names.items()})
-
-
-def _outside(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """How far points (dim, f) are from facets with corners (dim, dim, f, c), over the size of the facets: (f, c)."""
-    origin, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
-    offset = points[:, :, None] - origin
-    gram = np.einsum("iafc,ibfc->fcab", edges, edges)
-    weights = np.linalg.solve(gram, np.einsum("iafc,ifc->fca", edges, offset)[..., None])[..., 0]
-    beyond = np.maximum(np.maximum(-weights, 0).max(axis=-1), np.maximum(weights.sum(axis=-1) - 1, 0))
-    height = np.linalg.norm(offset - np.einsum("iafc,fca->ifc", edges, weights), axis=0)
-    return np.asarray(beyond + height / np.sqrt(np.trace(gram, axis1=2, axis2=3)))
-
-

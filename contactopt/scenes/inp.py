@@ -64,13 +64,12 @@ def read_inp(path: Path) -> Any:
         if hasattr(read, keyword):
             getattr(read, keyword)(options, rows)
     blocks = read.blocks + read.facets()
-    number = np.full(max(read.nodes, default=0) + 1, -1)
-    number[list(read.nodes)] = np.arange(len(read.nodes))
+    tags = sorted(read.nodes)
     return meshio.Mesh(
-        np.array(list(read.nodes.values())).reshape(-1, 3),
-        [(kind, number[nodes]) for kind, nodes, _ in blocks],
+        np.array([read.nodes[tag] for tag in tags]).reshape(-1, 3),
+        [(kind, np.searchsorted(tags, nodes)) for kind, nodes, _ in blocks],
         cell_sets={name: [_places(ids, found) for _, _, ids in blocks] for name, found in read.element_sets.items()},
-        point_sets={name: number[sorted(found & read.nodes.keys())] for name, found in read.node_sets.items()},
+        point_sets={name: np.searchsorted(tags, sorted(found & read.nodes.keys())) for name, found in read.node_sets.items()},
     )
 
 

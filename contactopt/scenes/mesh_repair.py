@@ -131,8 +131,8 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
     """
     own = np.arange(cells.points.shape[1])
     used = np.unique(cells.nodes)
-    pairs, distance, edge, size = _near_pairs(cells, used)
-    same = distance <= np.maximum(ONE * edge, SAME * size)
+    pairs, distance, edge = _near_pairs(cells, used)
+    same = distance <= ONE * edge
     unclear = np.flatnonzero(~same & (distance <= APART * edge))
     if len(unclear):
         i, j = pairs[unclear[0]]
@@ -153,26 +153,20 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
     return np.asarray(first[label])
 
 
-def _near_pairs(cells: Cells, used: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Pairs (m, 2) of nodes that are nearer than elements allow, how far they are apart, and the sizes there.
-
-    These are the length of the shortest edge and the size of the smaller element at the two nodes.
-    """
-    corners = cells.points[:, cells.corners]
-    size = np.linalg.norm(np.ptp(corners, axis=1), axis=0)
-    lengths = [np.linalg.norm(a - b, axis=0) for a, b in combinations(corners.transpose(1, 0, 2), 2)]
-    sizes = np.full((2, cells.points.shape[1]), np.inf)
+def _near_pairs(cells: Cells, used: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs (m, 2) of nodes nearer than APART of the shortest edge at one of them, how far they are apart, and that edge."""
+    corners = cells.points[:, cells.corners].transpose(1, 0, 2)
+    edge = np.min([np.linalg.norm(a - b, axis=0) for a, b in combinations(corners, 2)], axis=0)
+    shortest = np.full(cells.points.shape[1], np.inf)
     for row in cells.nodes:
-        np.minimum.at(sizes[0], row, np.min(lengths, axis=0))
-        np.minimum.at(sizes[1], row, size)
-    reach = np.maximum(APART * sizes[0], SAME * sizes[1])[used]
+        np.minimum.at(shortest, row, edge)
     tree = KDTree(cells.points[:, used].T)
-    crowded = np.flatnonzero(tree.query_ball_point(tree.data, reach, return_length=True) > 1)
-    near = tree.query_ball_point(tree.data[crowded], reach[crowded])
+    crowded = np.flatnonzero(tree.query_ball_point(tree.data, APART * shortest[used], return_length=True) > 1)
+    near = tree.query_ball_point(tree.data[crowded], APART * shortest[used[crowded]])
     found = {(min(i, j), max(i, j)) for i, others in zip(crowded.tolist(), near) for j in others if i != j}
     pairs = used[np.array(sorted(found), dtype=int).reshape(-1, 2)]
     distance = np.linalg.norm(cells.points[:, pairs[:, 0]] - cells.points[:, pairs[:, 1]], axis=0)
-    return pairs, distance, *sizes[:, pairs].min(axis=2)
+    return pairs, distance, shortest[pairs].min(axis=1)
 
 
 def repaired(cells: Cells, merged: np.ndarray) -> Cells:
@@ -252,6 +246,14 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
     InputError
         With the name of the first element that is wrong.
     """
+    nodes = mesh.doflocs[:, mesh.dofs.element_dofs] if len(cells.nodes) > len(cells.corners) else mesh.p[:, mesh.t]
+    apart = np.abs(nodes.sum(axis=1) - cells.points[:, cells.nodes].sum(axis=1)).max(axis=0)
+    wrong = np.flatnonzero(apart > SAME * np.ptp(nodes, axis=1).max(axis=0))
+    if len(wrong):
+        raise InputError(
+            f"mesh file '{cells.path}': {cells.name(wrong[0])} does not share the nodes within its edges and faces with its "
+            "neighbours; mesh this place anew."
+        )
     volume = volumes(mesh)
     size = np.linalg.norm(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** len(mesh.p)
     bad = np.flatnonzero((volume * np.sign(volume[:, -1:])).min(axis=1) <= FLAT * size)
@@ -301,12 +303,7 @@ def check_surface(path: Path, mesh: skfem.Mesh) -> None:
         If they do not, because elements overlap.
     """
     facets = mesh.boundary_facets()
-    cell = mesh.f2t[0, facets]
-    local = np.argmax(mesh.t2f[:, cell] == facets, axis=0)
-    corners = mesh.p[:, mesh.t[np.array(mesh.refdom.facets)[local].T, cell]]  # in their order around the facet
-    areas = _area_vectors(corners)
-    middle = mesh.p[:, mesh.t[:, cell]].mean(axis=1)
-    areas = areas * np.sign(np.sum(areas * (corners.mean(axis=1) - middle), axis=0))
+    areas = _area_vectors(mesh.p[:, outer_corners(mesh, facets)])
     total = np.abs(areas.sum(axis=1)).max()
     if total > CLOSED * np.linalg.norm(areas, axis=0).sum():
         raise InputError(
@@ -314,14 +311,39 @@ def check_surface(path: Path, mesh: skfem.Mesh) -> None:
         )
 
 
+def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
+    """Order the corners of facets of the surface such that their normals point outwards.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+    facets
+        (f,) numbers of facets of its surface.
+
+    Returns
+    -------
+    ndarray
+        (c, f) numbers of the corners in their order around each facet; in the plane the body is on their left.
+    """
+    cell = mesh.f2t[0, facets]
+    local = np.argmax(mesh.t2f[:, cell] == facets, axis=0)
+    nodes = mesh.t[np.array(mesh.refdom.facets)[local].T, cell]
+    corners = mesh.p[:, nodes]
+    outwards = corners.mean(axis=1) - mesh.p[:, mesh.t[:, cell]].mean(axis=1)
+    wrong = np.sum(_area_vectors(corners) * outwards, axis=0) < 0
+    nodes[:, wrong] = nodes[::-1, wrong]
+    return np.asarray(nodes)
+
+
 def _area_vectors(corners: np.ndarray) -> np.ndarray:
-    """Area times normal (dim, f), of either sign, of facets with corners (dim, c, f) in their order."""
+    """Area times normal (dim, f) of facets with corners (dim, c, f) in their order, the normal on the right of edges."""
     if len(corners) == 2:
         x, y = corners[:, 1] - corners[:, 0]
         return np.stack([y, -x])
     first, second = corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]
     if corners.shape[1] == 3:
-        second = corners[:, 1] - corners[:, 0]
+        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return np.asarray(np.cross(first, second, axis=0) / 2)
 
 
