@@ -189,9 +189,18 @@ def _corners(turn: np.ndarray, length: np.ndarray) -> np.ndarray:
 def _runs(x: np.ndarray, near: float) -> list[tuple[int, int, float]]:
     """First and last node, and curvature, of the runs of at least three nodes on a line or four on a circle."""
     found, start, last = [], 0, x.shape[1] - 1
+    steps = np.diff(x, axis=1)
+    area = np.hypot(*steps[:, :-1]) * np.hypot(*steps[:, 1:])
+    across = steps[:, :-1] + steps[:, 1:]
+    off = (steps[0, :-1] * steps[1, 1:] - steps[1, :-1] * steps[0, 1:]) / np.hypot(*across)  # from the neighbours' chord
+    straight = np.abs(off) <= 2 * near
+    even = np.abs(np.diff(off / area)) <= 2 * near * (1 / area[:-1] + 1 / area[1:])  # the same curvature at the next node
     while start < last:
-        line = _reach(x, start, lambda nodes: _on_line(nodes, near))
-        arc = _reach(x, start, lambda nodes: _circle(nodes, near) is not None)
+        line = arc = start
+        if start < len(straight) and straight[start]:
+            line = _reach(x, start, lambda nodes: _on_line(nodes, near))
+        if start < len(even) and even[start]:
+            arc = _reach(x, start, lambda nodes: _circle(nodes, near) is not None)
         if line - start >= 2 and arc - start <= 2 * (line - start):
             found.append((start, line, 0.0))
             start = line

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from contactopt.bodies.local_refinement import Curve, boundary_curves, split
+from contactopt.bodies.local_refinement import Curve, Function, boundary_curves, split
 from contactopt.scenes.scene import Part, Scene
 
 STEPS = 8  # of the iteration that keeps a coordinate
@@ -40,9 +39,11 @@ def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
 
         def mesh(_: int, zone: float | None) -> Any:
             made = part.build_mesh(elements, zone)
-            curves = part_curves(part, made)
-            if callable(part.mesh):
-                curves = {name: _kept_partners(curve, made, name) for name, curve in curves.items()}
+            curves: dict[str, Function] = dict(part_curves(part, made))
+            touching = {name: curves[name] for name in scene.surfaces_of(part) if name in curves}
+            if callable(part.mesh):  # what moves first stays where it is on other boundaries of the same curve
+                kept = {name: _kept_partners(curve, made, name) for name, curve in touching.items()}
+                curves = kept | {name: curve for name, curve in curves.items() if name not in kept}
             for _ in range(splits):
                 made = split(made, curves)
             return made
@@ -74,12 +75,12 @@ def part_curves(part: Part, mesh: Any, guess: bool = True) -> dict[str, Curve]:
     return {name: curve for name, curve in found.items() if curve is not None and (guess or curve.known)}
 
 
-def _kept_partners(curve: Curve, mesh: Any, name: str) -> Callable[[np.ndarray], np.ndarray]:
+def _kept_partners(curve: Curve, mesh: Any, name: str) -> Function:
     """A curve that leaves points the coordinate along which a boundary extends most, so that nodes of two bodies match.
 
     Where the boundary turns away from this coordinate by more than 45 degrees the curve stays as it is.
     """
-    if len(mesh.p) != 2 or not name:
+    if len(mesh.p) != 2:
         return curve
     ends = mesh.p[:, mesh.facets[:, mesh.boundaries[name]]]
     along = int(np.argmax(np.ptp(ends.reshape(2, -1), axis=1)))
