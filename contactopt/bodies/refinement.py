@@ -75,8 +75,8 @@ def part_curves(part: Part, mesh: Any, guess: bool = True) -> dict[str, Curve]:
     return {name: curve for name, curve in found.items() if curve is not None and (guess or curve.known)}
 
 
-def _kept_partners(curve: Curve, mesh: Any, name: str) -> Function:
-    """A curve that leaves points the coordinate along which a boundary extends most, so that nodes of two bodies match.
+def _kept_partners(curve: Function, mesh: Any, name: str) -> Function:
+    """A curve along which points keep one coordinate, so that the nodes of two bodies match.
 
     Where the boundary turns away from this coordinate by more than 45 degrees the curve stays as it is.
     """
