@@ -32,6 +32,8 @@ from contactopt.scenes.curves import Curve
 
 # a polygon that turns by more between two edges has a corner there; three chords make a fillet
 CORNER = np.deg2rad(35)
+LARGEST = np.deg2rad(75)  # unless it is an arc that is tangent to the edges beside it, and turns by less
+ALIKE = 1e-3  # relative difference of their curvatures, and of angles [rad]
 KINK = (
     np.deg2rad(5),
     5.0,
@@ -192,7 +194,32 @@ def _corners(turn: np.ndarray, length: np.ndarray) -> np.ndarray:
     beside = np.concatenate([rate[-2:-1], rate, rate[1:2]])
     expected = np.maximum(beside[:-2], beside[2:]) * span
     kink = (np.abs(turn) > KINK[0]) & (np.abs(turn) > KINK[1] * expected)
-    return np.asarray(np.isnan(turn) | (np.abs(turn) > CORNER) | kink)
+    return np.isnan(turn) | (~_on_fillet(turn, length) & ((np.abs(turn) > CORNER) | kink))
+
+
+def _on_fillet(turn: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Whether nodes lie on an arc of few chords: one tangent to the edges before and after it.
+
+    A chord of an arc of curvature k turns by twice asin(k c / 2), half of it at each end.
+    """
+    count = len(turn) - 1 if turn[0] == turn[-1] else len(turn)  # a closed chain ends where it begins
+    after = np.resize(np.append(length, [np.nan] * (count - len(length))), count)
+    before = np.roll(after, 1)
+    across = before**2 + after**2 + 2 * before * after * np.cos(turn[:count])
+    bend = 2 * np.sin(turn[:count]) / np.sqrt(across)
+    found = np.zeros(count, dtype=bool)
+    for node in np.flatnonzero((np.abs(turn[:count]) > CORNER) & (np.abs(turn[:count]) < LARGEST)):
+        alike = np.abs(bend - bend[node]) < ALIKE * np.abs(bend[node])
+        first = last = int(node)
+        while alike[(first - 1) % count] and last - first < count - 2:
+            first -= 1
+        while alike[(last + 1) % count] and last - first < count - 2:
+            last += 1
+        ends = np.array([first - 1, last + 1]) % count
+        half = np.arcsin(bend[node] * np.array([before[first % count], after[last % count]]) / 2)
+        if np.all(np.abs(turn[ends] - half) < ALIKE):
+            found[np.arange(first - 1, last + 2) % count] = True
+    return np.resize(found, len(turn))
 
 
 def _runs(x: np.ndarray, near: float) -> list[tuple[int, int, float]]:

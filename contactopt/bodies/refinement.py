@@ -53,7 +53,7 @@ def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
     return scene.with_parts(finer) if splits else scene
 
 
-def part_curves(part: Part, mesh: Any, guess: bool = True) -> dict[str, Curve]:
+def part_curves(part: Part, mesh: Any) -> dict[str, Curve]:
     """Find the curves of all curved boundaries of a part.
 
     Parameters
@@ -62,8 +62,6 @@ def part_curves(part: Part, mesh: Any, guess: bool = True) -> dict[str, Curve]:
         The part.
     mesh
         Its mesh.
-    guess
-        Whether the nodes of a polygon may stand for a smooth curve.
 
     Returns
     -------
@@ -72,7 +70,7 @@ def part_curves(part: Part, mesh: Any, guess: bool = True) -> dict[str, Curve]:
         what has no name.
     """
     found = {name: part.curve_of(name) or curve for name, curve in boundary_curves(mesh).items()}
-    return {name: curve for name, curve in found.items() if curve is not None and (guess or curve.known)}
+    return {name: curve for name, curve in found.items() if curve is not None}
 
 
 def _kept_partners(curve: Function, mesh: Any, name: str) -> Function:
