@@ -44,7 +44,7 @@ class Curve:
             )
         lost = np.flatnonzero(~np.isfinite(found).all(axis=0))
         if len(lost):
-            place = ", ".join(f"{x:.6g}" for x in points[:, lost[0]])
+            place = ", ".join(f"{x:.6g}" for x in np.reshape(points, (len(points), -1))[:, lost[0]])
             raise InputError(f"{self.name} gives no numbers for the point ({place}).")
         return found
 
