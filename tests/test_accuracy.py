@@ -12,7 +12,8 @@ from contactopt.analysis.accuracy import MOST_UNKNOWNS, refine, remainder
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.quantities import QUANTITIES, at_rim, peak_pressure
 from contactopt.analysis.zone import solve_zone
-from contactopt.bodies.refinement import split
+from contactopt.bodies.local_refinement import split
+from contactopt.bodies.refinement import split_scene
 from contactopt.interface.reduction import reduce_bodies
 from contactopt.material import Material
 from contactopt.scenes.meshes import rename, tensor_mesh
@@ -51,8 +52,7 @@ def test_the_remainder_does_not_trust_luck():
 
 def test_split_keeps_boundaries_and_puts_nodes_on_the_arc():
     sphere = scenes.sphere()
-    coarse = sphere.upper.mesh(8, 20.0)
-    fine = split(coarse, "contact")
+    coarse, fine = (scene.upper.build_mesh(8, 20.0) for scene in (sphere, split_scene(sphere, 8, 1)))
     assert fine.nelements == 4 * coarse.nelements
     assert set(fine.boundaries) == set(coarse.boundaries)
     nodes = np.unique(fine.facets[:, fine.boundaries["contact"]])
@@ -64,7 +64,7 @@ def test_split_keeps_boundaries_and_puts_nodes_on_the_arc():
 
 def test_split_of_a_flat_mesh_stays_flat():
     mesh = MeshQuad().with_boundaries({"contact": lambda x: x[1] == 0}).refined(2)
-    fine = split(mesh, "contact")
+    fine = split(mesh, {})
     assert np.ptp(fine.p[1, np.unique(fine.facets[:, fine.boundaries["contact"]])]) == 0
 
 
@@ -166,9 +166,9 @@ def test_given_meshes_are_halved():
     assert estimate.reached
 
 
-def test_given_meshes_of_solids_are_refused():
-    with pytest.raises(InputError, match="give the part a function"):
-        refine([two_blocks("solid")], "approach", 1e-9)
+def test_given_meshes_of_solids_are_halved():
+    _, estimate = refine([two_blocks("solid")], "approach", 1e-9, limits=Limits(5000))
+    assert len(estimate.levels) == 2 and estimate.value == pytest.approx(estimate.levels[0].value)
 
 
 def test_a_load_path_is_refined_as_a_whole():
