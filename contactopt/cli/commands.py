@@ -159,7 +159,7 @@ def show(options: argparse.Namespace) -> int:
 
 
 def simplify(options: argparse.Namespace) -> int:
-    from contactopt.analysis.simplest import simplify
+    from contactopt.simplification import simplify
     from contactopt.runner import scene_of
 
     print(simplify(scene_of(options.scene, **_arguments_of(options.set)), solve=not options.no_solve))

@@ -14,8 +14,8 @@ import numpy as np
 
 from contactopt.analysis.constants import COARSEST
 from contactopt.analysis.quantities import elastic_energy
-from contactopt.analysis.simplest.constants import SHARE, SMOOTH
-from contactopt.analysis.simplest.turning import with_pairs
+from contactopt.simplification.constants import SHARE, SMOOTH
+from contactopt.simplification.whole import with_pairs
 from contactopt.analysis.solve_scene import Options, Solved, solve_scene
 from contactopt.problem import InterfaceProblem, Pair
 from contactopt.scenes.scene import Scene

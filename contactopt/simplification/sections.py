@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import skfem
 
-from contactopt.analysis.simplest.turning import of_mesh
+from contactopt.simplification.whole import of_mesh
 from contactopt.scenes.scene import Plate, Rigid, Scene
 
 Lift = Callable[[np.ndarray], np.ndarray]
@@ -106,12 +106,3 @@ def part_boundaries(mesh: Any, scene: Scene) -> set[str]:
     """Names of the boundaries that a mesh has, made at the scene's own number of elements if it is a function."""
     made = mesh(scene.elements, scene.zone) if callable(mesh) else mesh
     return {name for name, facets in (made.boundaries or {}).items() if len(facets)}
-
-
-def to_axes(axis: np.ndarray) -> np.ndarray:
-    """A rotation that takes the axis to the third one; as much of the others as possible stays."""
-    z = axis / np.linalg.norm(axis)
-    x = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x = x - (x @ z) * z
-    x = x / np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z])

@@ -1,7 +1,7 @@
 """Half-spaces instead of bodies that are large beside their contact.
 
 One coarse solve gives the half-width a of the contact, the total force, and the gap about it, which a polynomial of the distance
-continues. Two errors remain for the peak pressure, both measured on Hertz's contact (contactopt.analysis.simplest.constants): that of
+continues. Two errors remain for the peak pressure, both measured on Hertz's contact (contactopt.simplification.constants): that of
 a body that ends at the distance L from the contact, FINITE (a / L)^2, and that of a surface that is not flat, STEEP times the square of
 its slope at the edge of the contact. The approach is not the same: it depends on the whole bodies.
 """
@@ -14,18 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.simplest.constants import ACROSS, FINITE, REACH, STEEP
-from contactopt.analysis.simplest.regions import region
+from contactopt.simplification.constants import ACROSS, FINITE, REACH, STEEP
 from contactopt.analysis.solve_scene import Solved
 from contactopt.analysis.status import contact_status
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
+from contactopt.simplification.whole import lattice_points
 
 FLAT = 0.95  # cosine between the contact normals inside the contact and their mean, at least
 RINGS = 2.0  # contact half-widths about the middle whose gaps the polynomial follows
 FEWEST = 4  # contacts inside the contact for its shape to be known
 ROUGH = 0.02  # of the indentation: how well the polynomial must follow the gap
 SMALL = 1e-6  # tangential force over the normal one that counts as none
-ALL = 64  # sides of each size among which the nearest one is looked for
 AROUND = 0.5  # cosine to the normal of the contact from which on a side belongs to the surface about it
 
 
@@ -135,8 +134,8 @@ def _size(solved: Solved, touching: np.ndarray) -> float:
         for plane in planes:
             around |= plane.contains(middles, float(np.ptp(mesh.p, axis=1).max()))
         if not around.all():
-            apart, _ = region(mesh, facets[~around]).distance(centre, ALL)
-            least = min(least, float(apart[0]))
+            points = lattice_points(mesh.p[:, mesh.facets[:, facets[~around]]])
+            least = min(least, float(np.linalg.norm(points - centre, axis=0).min()))
     return float(least)
 
 
