@@ -8,7 +8,7 @@ Four kinds of simplification are looked for, the exact ones first:
 
 | module | what may be left out | error |
 |---|---|---|
-| `solids.py` | the third dimension, of prisms between rollers and of bodies of revolution | none, or measured on the mesh |
+| `sections.py` | the third dimension, of prisms between rollers | none, or measured on the mesh |
 | `mirrors.py` | one half, across each plane of mirror symmetry | none |
 | `joints.py` | slip and opening of pairs that stick everywhere, friction of pairs that hardly rub | measured on a coarse mesh |
 | `large_bodies.py` | the mesh, where the contact is small beside the bodies | estimated, as measured on Hertz's contact |

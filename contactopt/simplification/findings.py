@@ -20,14 +20,14 @@ ROUNDING = 1e-10  # a smaller change between two solutions is rounding
 class Simplification:
     """Something that may be left out of a scene.
 
-    name      'plane strain', 'axisymmetry', 'mirror symmetry', 'half-spaces', 'tied contacts' or 'frictionless contacts'
+    name      'plane strain', 'mirror symmetry', 'half-spaces', 'tied contacts' or 'frictionless contacts'
     what      one sentence that says what is left out
     why       one or two sentences that say why, and how the error is known
     before, after   (unknowns, contacts that are not tied) of the scene that it is applied to, and of the simplified one, counted from their meshes
-    scene     the simplified scene; None where the mesh has to be made anew by hand
+    scene     the simplified scene
     folds     how the scene that it is applied to lies on the simplified one, where both have the same answer; else empty
     proof     certificate of the whole with what the simplified scene says of it; None where it was not computed
-    error     relative error that it makes; None where it is not known
+    error     relative error of a simplification that is not exact
     check     function of the solved simplified scene that says in a sentence whether what was assumed holds; None where
               nothing was assumed
     """
@@ -36,11 +36,11 @@ class Simplification:
     what: str
     why: str
     before: tuple[int, int]
-    after: tuple[int, int] | None = None
-    scene: Scene | None = field(default=None, repr=False)
+    after: tuple[int, int]
+    scene: Scene = field(repr=False)
     folds: tuple[Fold, ...] = field(default=(), repr=False)
     proof: float | None = None
-    error: float | None = None
+    error: float = 0.0
     check: Callable[[Solved], str] | None = field(default=None, repr=False)
 
     @property
@@ -55,12 +55,8 @@ class Simplification:
             error = f"no error: the certificate of the whole is {self.proof:.0e}"
         elif self.folds:
             error = "no error, but not proved"
-        elif self.error is None:
-            error = "error not known"
         else:
             error = f"error about {self.error:.1e}" if self.error > ROUNDING else "no error on the coarse mesh"
-        if self.after is None:
-            return error
         (n, k), (m, c) = self.before, self.after
         return f"{n} -> {count(m, 'unknown')}, {k} -> {count(c, 'contact')}, {error}"
 
@@ -99,8 +95,7 @@ class Simplified:
         used = [each for each in self.found if each.folds]
         if not used:
             return f"Scene '{self.given.name}' needs all of its model: nothing can be left out exactly."
-        unknowns, contacts = used[-1].after or used[-1].before
-        first = used[0].before
+        (unknowns, contacts), first = used[-1].after, used[0].before
         doubt = "" if used[-1].exact else ", if the proof holds, which takes its solution"
         return (
             f"Scene '{self.given.name}' needs no more than {_model(self.given, self.scene)}{doubt}: "
@@ -111,8 +106,6 @@ class Simplified:
         lines = [self.needs]
         for each in self.found:
             lines += ["", f"{each.name}: {each.what}", f"  {each.why}", f"  {each.price}"]
-            if each.scene is None:
-                lines[-1] += "; make this mesh anew to apply it"
         return "\n".join([*lines, *(["", *self.notes] if self.notes else [])])
 
     def __repr__(self) -> str:
@@ -129,7 +122,9 @@ class Simplified:
 def _model(given: Scene, scene: Scene) -> str:
     """'one quarter of the bodies', 'one half of a section in plane strain'."""
     whole = "what is modelled" if given.copies > 1 else "the bodies"
-    if scene.kind != given.kind:
-        whole = {"plane-strain": "a section in plane strain"}.get(scene.kind, "an axisymmetric section")
+    whole = whole if scene.kind == given.kind else "a section in plane strain"
     part = PARTS.get(scene.copies // given.copies)
     return f"one {part} of {whole}" if part else whole
+
+
+Found = tuple[list[Simplification], list[str]]  # what was found, and sentences about what spoils it

@@ -1,22 +1,22 @@
 """Whether a scene is its own mirror image: meshes, materials, supports, loads, laws, friction and gaps.
 
-A mesh is its own image, or that of another body, if every node and every element has one. The solution of the whole scene is
-then its own image, too, on this mesh and to the last digits. Boundaries are compared by their facets, and functions of the
-place at the nodes and between them. Nothing is read from names.
+A mesh is its own image, or that of another body, if every node and every element has one. The solution
+of the whole scene is then its own image, too, on this mesh and to the last digits. Boundaries are
+compared by their facets, and functions of the place at the nodes and between them. Nothing is read
+from names.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene import BodyForce, Part, Plate, Support
+from contactopt.scenes.scene import Part, Plate, Support
 from contactopt.simplification.constants import EQUAL, NEAR, ROUNDED
 from contactopt.simplification.whole import Whole
 
@@ -35,7 +35,7 @@ class Plane:
 
     def image(self, points: np.ndarray) -> np.ndarray:
         """The mirror images of points (dim, k)."""
-        return np.asarray(points - 2 * self.normal[:, None] * (self.normal @ points - self.offset))
+        return np.asarray(points - 2 * self.normal[:, None] * self.height(points))
 
     def height(self, points: np.ndarray) -> np.ndarray:
         """How far points (dim, ...) are on the positive side."""
@@ -43,20 +43,21 @@ class Plane:
 
     def words(self, components: tuple[str, ...]) -> str:
         """'x = 0', or '0.866 x + 0.5 y = 3'."""
-        terms = [(value, component) for value, component in zip(self.normal, components) if abs(value) > NEAR]
+        pairs = zip(self.normal, components)
+        terms = [(value, component) for value, component in pairs if abs(value) > NEAR]
         sign = np.sign(terms[0][0])
-        offset = sign * self.offset if abs(self.offset) > 1e-12 else 0.0
-        if len(terms) == 1:
-            return f"{terms[0][1]} = {offset:g}"
-        text = " + ".join(f"{sign * value:.4g} {component}" for value, component in terms).replace("+ -", "- ")
-        return f"{text} = {offset:.4g}"
+        factors = ["" if len(terms) == 1 else f"{sign * value:.4g} " for value, _ in terms]
+        text = " + ".join(factor + component for factor, (_, component) in zip(factors, terms))
+        offset = sign * self.offset if abs(self.offset) > ROUNDED else 0.0
+        return f"{text.replace('+ -', '- ')} = {offset:.4g}"
 
 
 @dataclass(frozen=True, eq=False)
 class Images:
     """How a scene lies on itself after a reflection.
 
-    bodies   name of each body -> name of its image;  pairs  name of each pair of surfaces -> name of its image
+    bodies   name of each body -> name of its image
+    pairs    name of each pair of surfaces -> name of its image
     own      (body, number of a load) of the plates that are their own images
     swapped  names of the pairs whose image has the upper surface for its lower one
     """
@@ -72,11 +73,12 @@ def images_under(whole: Whole, plane: Plane) -> Images | str | None:
 
     Half a sentence if the meshes lie on themselves and the rest does not; None if they do not.
     """
-    return _Comparison(whole, plane).images()
+    nodes = _images_of_meshes(whole, plane)
+    return None if nodes is None else _Comparison(whole, plane, nodes).images()
 
 
 def equal_functions(one: Any, other: Any, here: np.ndarray, there: np.ndarray) -> bool:
-    """Whether one function (or number) here and the other there are the same, each value beside itself."""
+    """Whether one function (or number) here and the other there are the same at places (dim, s)."""
     a, b = (
         np.broadcast_to(np.asarray(f(x) if callable(f) else f, dtype=float), x.shape[1:])
         for f, x in ((one, here), (other, there))
@@ -85,220 +87,39 @@ def equal_functions(one: Any, other: Any, here: np.ndarray, there: np.ndarray) -
     return bool(np.all(np.abs(a - b) <= EQUAL * size + ROUNDED * size.max(initial=0.0)))
 
 
-def held_space(components: tuple[str, ...], values: Mapping[str, float] | None) -> tuple[np.ndarray, np.ndarray]:
-    """The projection (dim, dim) on the components that have values, and these values as a vector (dim,)."""
+def held_space(
+    components: tuple[str, ...], values: Mapping[str, float] | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The projection (dim, dim) on the components that have values, and these values (dim,)."""
     values = dict.fromkeys(components, 0.0) if values is None else values
     mask = np.array([component in values for component in components])
-    return np.diag(mask.astype(float)), np.array([float(values.get(component, 0.0)) for component in components])
+    return np.diag(mask * 1.0), np.array([float(values.get(c, 0.0)) for c in components])
 
 
-def close(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether two vectors are equal."""
-    return bool(np.all(np.abs(one - other) <= EQUAL * max(np.abs(one).max(), np.abs(other).max())))
-
-
-@dataclass(frozen=True, eq=False)
-class _Comparison:
-    """A scene beside its image under one reflection."""
-
-    whole: Whole
-    plane: Plane
-
-    @cached_property
-    def bodies(self) -> dict[str, tuple[str, np.ndarray]] | None:
-        """The image of each elastic body, and where its nodes lie there; None if one has none."""
-        found = {}
-        for name, mesh in self.whole.meshes.items():
-            for image in (name, *(other for other in self.whole.meshes if other != name)):
-                nodes = self._nodes(mesh, self.whole.meshes[image])
-                if nodes is not None:
-                    found[name] = image, nodes
-                    break
-            else:
-                return None
-        return found if all(found[image][0] == name for name, (image, _) in found.items()) else None
-
-    def _nodes(self, mesh: Any, image: Any) -> np.ndarray | None:
-        """The node of a mesh on which the image of each node lies; None unless nodes and elements all have their images."""
-        here, there = self.plane.image(mesh.doflocs), image.doflocs
-        if here.shape != there.shape or mesh.t.shape != image.t.shape:
-            return None
-        near = NEAR * self.whole.size
-        if np.abs(np.sort(here, axis=1)[:, [0, -1]] - np.sort(there, axis=1)[:, [0, -1]]).max() > near:
-            return None
-        distance, nodes = KDTree(there.T).query(here.T)
-        fits = distance.max() <= near and np.array_equal(_cells(nodes[mesh.t]), _cells(image.t))
-        return np.asarray(nodes) if fits else None
-
-    def fits(self, body: str, boundary: str, other: str) -> bool:
-        """Whether a boundary of a body has another boundary of its image as its mirror image."""
-        assert self.bodies is not None
-        image, nodes = self.bodies[body]
-        mesh, there = self.whole.meshes[body], self.whole.meshes[image]
-        own, facets = mesh.facets[:, mesh.boundaries[boundary]], there.facets[:, there.boundaries[other]]
-        return own.shape == facets.shape and np.array_equal(_cells(nodes[own]), _cells(facets))
-
-    def images(self) -> Images | str | None:
-        """As images_under()."""
-        if self.bodies is None or not all(map(self._surfaces_fit, self.bodies)):
-            return None
-        own: set[tuple[str, int]] = set()
-        for name in self.bodies:
-            reason = self._part_differs(name, own)
-            if reason:
-                return reason
-        rigid = self._images_of_rigid()
-        if isinstance(rigid, str):
-            return rigid
-        return self._images_of_pairs({name: image for name, (image, _) in self.bodies.items()} | rigid, own)
-
-    def _surfaces_fit(self, name: str) -> bool:
-        """Whether every contact surface of a body has a contact surface as its image."""
-        scene, image = self.whole.scene, self._image(name)
-        return all(
-            any(self.fits(name, surface, other) for other in scene.surfaces_of(image))
-            for surface in scene.surfaces_of(self.whole.parts[name])
-        )
-
-    def _image(self, name: str) -> Part:
-        assert self.bodies is not None
-        return self.whole.parts[self.bodies[name][0]]
-
-    def _part_differs(self, name: str, own: set[tuple[str, int]]) -> str:
-        """Half a sentence if a body has another material, other supports, loads or curves than its image."""
-        part, image = self.whole.parts[name], self._image(name)
-        if part.material != image.material:
-            return f"the bodies '{name}' and '{image.name}' have different materials"
-        for item in (*part.supports, *part.loads):
-            found = [other for other in (*image.supports, *image.loads) if self._is_image(name, item, other)]
-            if not found:
-                where = f" on {item.boundary!r}" if hasattr(item, "boundary") else ""
-                return f"the {_kind(item)}{where} of body '{name}' has no mirror image"
-            if isinstance(item, Plate) and found[0] is item:
-                own.add((name, part.loads.index(item)))
-        for surface in self.whole.scene.surfaces_of(part):
-            curve, x = part.curve_of(surface), self.whole.acting(name, surface)
-            others = [
-                image.curve_of(s) for s in self.whole.scene.surfaces_of(image) if self.fits(name, surface, s)
-            ]
-            if (curve is None) != (others[0] is None):
-                return f"the curve of body '{name}' is not symmetric"
-            if curve is not None and others[0] is not None:
-                apart = np.abs(self.plane.image(curve(x)) - others[0](self.plane.image(x))).max()
-                if not apart <= ROUNDED * self.whole.size:
-                    return f"the curve of body '{name}' is not symmetric"
-        return ""
-
-    def _is_image(self, name: str, one: Any, other: Any) -> bool:
-        """Whether one support or load of a body becomes the other one of its image."""
-        if type(one) is not type(other) or getattr(one, "glued", 0) != getattr(other, "glued", 0):
-            return False
-        components = self.whole.scene.components
-        if isinstance(one, (Support, Plate)):
-            values = [item.displacement if isinstance(item, Support) else item.force for item in (one, other)]
-            same = self._same_values(*values)
+def _images_of_meshes(whole: Whole, plane: Plane) -> dict[str, tuple[str, np.ndarray]] | None:
+    """The image of each elastic body, and where its nodes lie there; None if one has none."""
+    found: dict[str, tuple[str, np.ndarray]] = {}
+    for name, mesh in whole.meshes.items():
+        for image in (name, *whole.meshes):
+            nodes = _nodes(mesh, whole.meshes[image], plane, NEAR * whole.size)
+            if nodes is not None:
+                found[name] = image, nodes
+                break
         else:
-            same = close(self.plane.reflection @ np.array(one.value, float), np.array(other.value, float))
-        assert len(components) == len(self.plane.normal)
-        return same and (isinstance(one, BodyForce) or self.fits(name, one.boundary, other.boundary))
+            return None
+    return found if all(found[image][0] == name for name, (image, _) in found.items()) else None
 
-    def _same_values(self, one: Mapping[str, float] | None, other: Mapping[str, float] | None) -> bool:
-        """Whether the reflection turns the values of some components into others."""
-        components, H = self.whole.scene.components, self.plane.reflection
-        (P, v), (Q, w) = held_space(components, one), held_space(components, other)
-        return bool(np.allclose(H @ P @ H.T, Q, atol=EQUAL)) and close(H @ v, w)
 
-    def _images_of_rigid(self) -> dict[str, str] | str:
-        """The image of each rigid body: the one whose partners, forces, normal and gap are the images of its own."""
-        found: dict[str, str] = {}
-        for name in self.whole.rigid:
-            reasons = []
-            for other in (name, *(another for another in self.whole.rigid if another != name)):
-                reasons.append(self._rigid_differ(name, other))
-                if not reasons[-1]:
-                    found[name] = other
-                    break
-            else:
-                return reasons[0]
-        if any(found[image] != name for name, image in found.items()):
-            return "rigid bodies are not each other's images"
-        return found
-
-    def _partners(self, rigid: str) -> list[tuple[str, str]]:
-        """The surfaces (elastic body, boundary) that may touch a rigid body."""
-        pairs = [pair for pair in self.whole.scene.pairs if rigid in pair.bodies]
-        sides = [1 - pair.bodies.index(rigid) for pair in pairs]
-        return [(pair.bodies[side], self.whole.surface_of(pair, side)) for pair, side in zip(pairs, sides)]
-
-    def _rigid_differ(self, name: str, other: str) -> str:
-        assert self.bodies is not None
-        one, two, surfaces = self.whole.rigid[name], self.whole.rigid[other], self._partners(name)
-        for body, boundary in surfaces:
-            there = [s for partner, s in self._partners(other) if partner == self.bodies[body][0]]
-            if not any(self.fits(body, boundary, s) for s in there):
-                return f"what rigid body '{name}' touches has no mirror image"
-        for what in ("force", "displacement"):
-            if not self._same_values(getattr(one, what) or {}, getattr(two, what) or {}):
-                return f"the {what} of rigid body '{name}' is not symmetric"
-        normals = [None if body.normal is None else np.array(body.normal, float) for body in (one, two)]
-        if normals[0] is None or normals[1] is None:
-            turned = normals[0] is not normals[1]
-        else:
-            a, b = (normal / np.linalg.norm(normal) for normal in normals)  # type: ignore[arg-type, type-var]
-            turned = not close(self.plane.reflection @ a, b)
-        if turned:
-            return f"the normal of rigid body '{name}' is not symmetric"
-        gaps = [0.0 if gap is None else gap for gap in (one.gap, two.gap)]
-        if any(np.ndim(gap) for gap in gaps if not callable(gap)):
-            return f"the gap of rigid body '{name}' is no function of the place, and has no image to compare it with"
-        for x in (self.whole.acting(*surface) for surface in surfaces):
-            if not equal_functions(*gaps, x, self.plane.image(x)):
-                return f"the gap of rigid body '{name}' is not symmetric"
-        return ""
-
-    def _images_of_pairs(self, images: Mapping[str, str], own: set[tuple[str, int]]) -> Images | str:
-        """With the image of each pair of surfaces; half a sentence if one has none, or if it lies in the plane."""
-        found, swapped = {}, set()
-        for pair in self.whole.scene.pairs:
-            if images[pair.bodies[0]] == pair.bodies[1]:
-                return f"the contact '{pair.name}' lies in this plane itself, between a body and its own mirror image"
-            facing = [(o, self._facing(pair, o, images)) for o in self.whole.scene.pairs]
-            facing = [(other, order) for other, order in facing if order is not None]
-            if not facing:
-                return f"the contact '{pair.name}' has no mirror image"
-            other, order = facing[0]
-            reason = self._law_differs(pair, other)
-            if reason:
-                return reason
-            found[pair.name] = other.name
-            if order == (1, 0):
-                swapped.add(pair.name)
-        return Images(images, found, frozenset(own), frozenset(swapped))
-
-    def _facing(self, pair: Contact, other: Contact, images: Mapping[str, str]) -> tuple[int, int] | None:
-        """Which sides of the other pair are the images of the upper and the lower side of this one; None if they are not."""
-        for order in ((0, 1), (1, 0)):
-            named = [images[pair.bodies[side]] == other.bodies[there] for side, there in enumerate(order)]
-            if all(named) and all(
-                pair.bodies[side] in self.whole.rigid
-                or self.fits(pair.bodies[side], self.whole.surface_of(pair, side), self.whole.surface_of(other, there))
-                for side, there in enumerate(order)
-            ):
-                return order
+def _nodes(mesh: Any, image: Any, plane: Plane, near: float) -> np.ndarray | None:
+    """The node of a mesh on which the image of each node lies; None unless all have images."""
+    here, there = plane.image(mesh.doflocs), image.doflocs
+    if here.shape != there.shape or mesh.t.shape != image.t.shape:
         return None
-
-    def _law_differs(self, pair: Contact, other: Contact) -> str:
-        """Half a sentence if two pairs have different laws or friction."""
-        if (pair.law, pair.coupling) != (other.law, other.coupling):
-            return f"the contact '{pair.name}' has another law or coupling than its mirror image"
-        if any(np.ndim(mu) for mu in (pair.mu, other.mu) if not callable(mu)):
-            return f"the friction of contact '{pair.name}' is given contact by contact"
-        for side in (0, 1):
-            if pair.bodies[side] in self.whole.parts:
-                x = self.whole.acting(pair.bodies[side], self.whole.surface_of(pair, side))
-                if not equal_functions(pair.mu, other.mu, x, self.plane.image(x)):
-                    return f"the friction of contact '{pair.name}' differs from that of its mirror image"
-        return ""
+    if max(np.abs(f(here, 1) - f(there, 1)).max() for f in (np.min, np.max)) > near:
+        return None
+    distance, nodes = KDTree(there.T).query(here.T)
+    fits = distance.max() <= near and np.array_equal(_cells(nodes[mesh.t]), _cells(image.t))
+    return np.asarray(nodes) if fits else None
 
 
 def _cells(cells: np.ndarray) -> np.ndarray:
@@ -307,7 +128,141 @@ def _cells(cells: np.ndarray) -> np.ndarray:
     return np.asarray(made[:, np.lexsort(made)])
 
 
-def _kind(item: Any) -> str:
-    return {"BodyForce": "force per volume"}.get(type(item).__name__, type(item).__name__.lower())
+def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[tuple[str, str, Any, Any, Any]]:
+    """Of a body: words, the boundary, the projection on components, the values there, the object."""
+    if not isinstance(part, Part):
+        for what in ("force", "displacement"):
+            yield what, "", *held_space(components, getattr(part, what) or {}), None
+        normal = np.zeros(len(components)) if part.normal is None else np.array(part.normal, float)
+        yield "normal", "", np.eye(len(components)), normal / (np.linalg.norm(normal) or 1.0), None
+        return
+    for item in (*part.supports, *part.loads):
+        where, kind = getattr(item, "boundary", ""), type(item).__name__.lower()
+        if isinstance(item, (Support, Plate)):
+            values = item.displacement if isinstance(item, Support) else item.force
+            kind += "" if getattr(item, "glued", True) else " that slides"
+            yield kind, where, *held_space(components, values), item
+        else:
+            kind = kind.replace("bodyforce", "force per volume")
+            yield kind, where, np.eye(len(components)), np.array(item.value, float), item
 
 
+@dataclass(frozen=True, eq=False)
+class _Comparison:
+    """A scene beside its image under one reflection; `nodes` as _images_of_meshes()."""
+
+    whole: Whole
+    plane: Plane
+    nodes: Mapping[str, tuple[str, np.ndarray]]
+
+    def fits(self, body: str, boundary: str, other: str) -> bool:
+        """Whether a boundary of a body has another boundary of its image as its mirror image."""
+        image, nodes = self.nodes[body]
+        mesh, there = self.whole.meshes[body], self.whole.meshes[image]
+        own = mesh.facets[:, mesh.boundaries[boundary]]
+        return np.array_equal(_cells(nodes[own]), _cells(there.facets[:, there.boundaries[other]]))
+
+    def images(self) -> Images | str | None:
+        """As images_under()."""
+        own: set[tuple[str, int]] = set()
+        for name, (image, _) in self.nodes.items():
+            part, other = self.whole.parts[name], self.whole.parts[image]
+            for surface in self.whole.scene.surfaces_of(part):
+                if not any(self.fits(name, surface, s) for s in self.whole.scene.surfaces_of(other)):
+                    return None
+            if part.material != other.material:
+                return f"the bodies '{name}' and '{image}' have different materials"
+            reason = self._conditions_differ(part, other, own) or self._curves_differ(part, other)
+            if reason:
+                return reason
+        return self._with_pairs({name: image for name, (image, _) in self.nodes.items()}, own)
+
+    def _conditions_differ(self, part: Any, image: Any, own: set[tuple[str, int]]) -> str:
+        """Half a sentence about a support, load, force or normal that has no image; fills `own`."""
+        components, H = self.whole.scene.components, self.plane.reflection
+        others = list(_conditions(image, components))
+        for kind, where, P, v, item in _conditions(part, components):
+            for other_kind, there, Q, w, other in others:
+                size = max(np.abs(v).max(), np.abs(w).max())
+                same = np.allclose(H @ P @ H, Q, atol=EQUAL) and np.all(np.abs(H @ v - w) <= EQUAL * size)
+                if kind == other_kind and same and (not where or self.fits(part.name, where, there)):
+                    if item is other and isinstance(item, Plate):
+                        own.add((part.name, part.loads.index(item)))
+                    break
+            else:
+                place = f" on {where!r}" if where else ""
+                return f"the {kind}{place} of body '{part.name}' has no mirror image"
+        return ""
+
+    def _curves_differ(self, part: Part, image: Part) -> str:
+        for surface in self.whole.scene.surfaces_of(part):
+            surfaces = self.whole.scene.surfaces_of(image)
+            other = next(image.curve_of(s) for s in surfaces if self.fits(part.name, surface, s))
+            curve, x = part.curve_of(surface), self.whole.acting(part.name, surface)
+            both = curve is not None and other is not None
+            apart = self.plane.image(curve(x)) - other(self.plane.image(x)) if both else np.zeros(1)
+            if (curve is None) != (other is None) or not np.abs(apart).max() <= ROUNDED * self.whole.size:
+                return f"the curve of body '{part.name}' is not symmetric"
+        return ""
+
+    def _with_pairs(self, images: dict[str, str], own: set[tuple[str, int]]) -> Images | str:
+        """With the images of pairs and rigid bodies; half a sentence if one has none or is cut."""
+        found: dict[str, str] = {}
+        swapped: set[str] = set()
+        for pair in self.whole.scene.pairs:
+            if images.get(pair.bodies[0]) == pair.bodies[1]:
+                return (
+                    f"the contact '{pair.name}' lies in this plane itself, between a body and its own "
+                    "mirror image"
+                )
+            reasons = [f"the contact '{pair.name}' has no mirror image"]
+            for other in (pair, *self.whole.scene.pairs):
+                order = self._facing(pair, other, images)
+                reason = "" if order is None else self._pair_differs(pair, other, order)
+                if order is not None and not reason:
+                    found[pair.name] = other.name
+                    images |= {pair.bodies[side]: other.bodies[there] for side, there in enumerate(order)}
+                    swapped |= {pair.name} if order == (1, 0) else set()
+                    break
+                reasons = [reason, *reasons] if reason and len(reasons) == 1 else reasons
+            else:
+                return reasons[0]
+        if any(images[image] != name for name, image in images.items()):
+            return "rigid bodies are not each other's images"
+        return Images(images, found, frozenset(own), frozenset(swapped))
+
+    def _facing(self, pair: Contact, other: Contact, images: Mapping[str, str]) -> tuple[int, int] | None:
+        """Which sides of the other pair are the images of the upper and the lower side of this one."""
+        for order in ((0, 1), (1, 0)):
+            for side, there in enumerate(order):
+                body, image = pair.bodies[side], other.bodies[there]
+                if images.get(body, image) != image or (body in self.nodes) != (image in self.nodes):
+                    break
+                surfaces = self.whole.surface_of(pair, side), self.whole.surface_of(other, there)
+                if body in self.nodes and not self.fits(body, *surfaces):
+                    break
+            else:
+                return order
+        return None
+
+    def _pair_differs(self, pair: Contact, other: Contact, order: tuple[int, int]) -> str:
+        """Half a sentence if two pairs have different laws, friction, gaps or rigid bodies."""
+        if (pair.law, pair.coupling) != (other.law, other.coupling):
+            return f"the contact '{pair.name}' has another law or coupling than its mirror image"
+        functions = [(f"friction of contact '{pair.name}'", pair.mu, other.mu)]
+        for side, there in enumerate(order):
+            one = self.whole.rigid.get(pair.bodies[side])
+            two = self.whole.rigid.get(other.bodies[there])
+            if one is not None and two is not None:
+                reason = self._conditions_differ(one, two, set())
+                if reason:
+                    return reason
+                gaps = [0.0 if gap is None else gap for gap in (one.gap, two.gap)]
+                functions.append((f"gap of rigid body '{one.name}'", *gaps))
+        x = np.concatenate([self.whole.acting(*surface) for surface in self.whole.surfaces(pair)], axis=1)
+        for what, here, there_too in functions:
+            if any(np.ndim(each) for each in (here, there_too) if not callable(each)):
+                return f"the {what} is no function of the place, and has no image to compare it with"
+            if not equal_functions(here, there_too, x, self.plane.image(x)):
+                return f"the {what} is not symmetric"
+        return ""

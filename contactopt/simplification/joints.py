@@ -15,7 +15,8 @@ import numpy as np
 from contactopt.analysis.constants import COARSEST
 from contactopt.analysis.quantities import elastic_energy
 from contactopt.simplification.constants import SHARE, SMOOTH
-from contactopt.simplification.whole import with_pairs
+from contactopt.simplification.findings import Simplification
+from contactopt.simplification.whole import sizes_of, with_pairs
 from contactopt.analysis.solve_scene import Options, Solved, solve_scene
 from contactopt.problem import InterfaceProblem, Pair
 from contactopt.scenes.scene import Scene
@@ -137,3 +138,38 @@ def _mu(value: object, problem: InterfaceProblem, pair: Pair) -> np.ndarray:
     places = problem.coordinates[:, pair.contacts]
     made = value(places) if callable(value) else value
     return np.broadcast_to(np.asarray(made, dtype=float), places.shape[1:])
+
+
+def offered_joints(scene: Scene, solved: Solved) -> list[Simplification]:
+    """Pairs that can be tied or frictionless, as a solution on a coarse mesh shows them."""
+    tied, smooth = joints(solved)
+    if len(tied) == len(scene.pairs) == 1:
+        tied = ()
+    found = []
+    friction: dict[str, object] = {pair.name: pair.mu for pair in scene.pairs}
+    for names, law in ((tied, "tied"), (smooth, "frictionless")):
+        if not names:
+            continue
+        made = with_law(scene, names, law)
+        other = coarse(made)
+        if not other.solution.solved:
+            continue
+        listed = ("contact " if len(names) == 1 else "contacts ") + ", ".join(f"'{each}'" for each in names)
+        if law == "tied":
+            what = f"The {listed} can be tied."
+            why = (
+                f"On a coarse mesh they stay closed and use no more than {SHARE:.0%} of their friction "
+                "bound at any node."
+            )
+            check = verdict_on_ties(names, friction)
+        else:
+            what = f"Friction can be left out at the {listed}."
+            why = (
+                "On a coarse mesh no tangential traction is more than a hundredth of the largest "
+                "pressure."
+            )
+            check = verdict_on_smooth(names)
+        why += " The error is the largest change of energy, contact forces and largest pressures on that mesh."
+        sizes, error = (sizes_of(scene), sizes_of(made)), change(solved, other)
+        found.append(Simplification(f"{law} contacts", what, why, *sizes, made, error=error, check=check))
+    return found

@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.simplification.constants import ACROSS, FINITE, REACH, STEEP
+from contactopt.simplification.constants import ACROSS, FINITE, REACH, STEEP, WORST
+from contactopt.simplification.findings import Found, Simplification
 from contactopt.analysis.solve_scene import Solved
 from contactopt.analysis.status import contact_status
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
-from contactopt.simplification.whole import lattice_points
+from contactopt.simplification.whole import lattice_points, sizes_of
 
 FLAT = 0.95  # cosine between the contact normals inside the contact and their mean, at least
 RINGS = 2.0  # contact half-widths about the middle whose gaps the polynomial follows
@@ -191,3 +192,27 @@ def as_half_spaces(scene: Scene, spot: Spot) -> Scene:
         units=scene.units,
         reference=scene.reference,
     )
+
+
+def offered_half_spaces(scene: Scene, solved: Solved) -> Found:
+    """Half-spaces for the bodies of a scene, as a solution on a coarse mesh shows the contact."""
+    spot = spot_of(solved)
+    if scene.kind == "axisymmetric":  # a section costs less than the square of points of a half-space
+        return [], []
+    if isinstance(spot, str):
+        return [], [f"Half-spaces are no model of this scene: {spot}."] if len(scene.pairs) == 1 else []
+    size = f"{spot.size / spot.half_width:.3g} half-widths from the contact"
+    if spot.error > WORST:
+        return [], [
+            f"Half-spaces would make an error of about {spot.error:.0%} in the peak pressure: the bodies "
+            f"end {size}."
+        ]
+    made = as_half_spaces(scene, spot)
+    why = (
+        f"The bodies end no nearer than {size}, and the gap rises by at most {spot.slope:.2g} per length "
+        "inside it. The error is that of the peak pressure and the half-width; the approach is another "
+        "one, because it depends on the whole bodies."
+    )
+    what = "Half-spaces without a mesh stand for the bodies; their frame is the contact's own."
+    sizes = sizes_of(scene), sizes_of(made)
+    return [Simplification("half-spaces", what, why, *sizes, made, error=spot.error)], []

@@ -54,6 +54,11 @@ class Whole:
         part = self.parts.get(pair.bodies[side])
         return "" if part is None else pair.surfaces[side] or part.contact
 
+    def surfaces(self, pair: Contact) -> list[tuple[str, str]]:
+        """(body, boundary) of the elastic sides of a pair."""
+        named = [(pair.bodies[side], self.surface_of(pair, side)) for side in (0, 1)]
+        return [(body, boundary) for body, boundary in named if boundary]
+
     def acting(self, body: str, boundary: str) -> np.ndarray:
         """(dim, s) where gap and friction act: the nodes of a boundary and points between them, on its curve as well."""
         if (body, boundary) not in self._acting:
