@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from contactopt.analysis.diagnosis import Diagnosis, diagnose
     from contactopt.analysis.enumeration import all_solutions
     from contactopt.analysis.paths import PathResult, follow
-    from contactopt.simplification.findings import Simplification, Simplified
-    from contactopt.simplification.search import simplify
     from contactopt.analytic import Reference
     from contactopt.bodies.fields import Fields
     from contactopt.derivatives.design import Design, design
@@ -35,6 +33,8 @@ if TYPE_CHECKING:
     from contactopt.scenes.contact import Contact
     from contactopt.scenes.mesh_files import load_mesh
     from contactopt.scenes.scene import BodyForce, HalfSpace, Part, Plate, Rigid, Scene, Support, Traction
+    from contactopt.simplification.findings import Simplification, Simplified
+    from contactopt.simplification.search import simplify
     from contactopt.solving.driver import solve
 
 # name -> the module that it stands in

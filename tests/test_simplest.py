@@ -319,19 +319,17 @@ def test_what_changes_along_a_prism_is_seen(way):
 
     ticks = np.linspace(-2, 2, 9), np.linspace(0, 2, 5), np.linspace(-2, 0, 4)
     mesh = rename(tensor_mesh(*ticks), contact="z+", bottom="z-", near="y-", far="y+")
-    for spoilt in (False, True):
+
+    def roller(spoilt: bool) -> Scene:
         ridge, slip, crown = (spoilt and way == name for name in ("gap", "friction", "curve"))
         curve = (lambda x: x + np.array([[0], [0], [1e-3]]) * np.sin(x[1])) if crown else None
         held = (Support("bottom"), Support("near", {"y": 0.0}), Support("far", {"y": 0.0}))
-        roller = Rigid("roller", (0.0, 0.0, 1.0), lambda x: x[0] ** 2 / 20 - ridge * 0.1 * band(x), {"z": -1.0})
-        scene = Scene(
-            "roller",
-            roller,
-            Part("block", mesh, SOFT, held, curve=curve),
-            lambda x: 0.3 - slip * 0.2 * band(x) + 0 * x[0],
-            kind="solid",
-        )
-        found = simplify(scene)
+        upper = Rigid("roller", (0.0, 0.0, 1.0), lambda x: x[0] ** 2 / 20 - ridge * 0.1 * band(x), {"z": -1.0})
+        block = Part("block", mesh, SOFT, held, curve=curve)
+        return Scene("roller", upper, block, lambda x: 0.3 - slip * 0.2 * band(x) + 0 * x[0], kind="solid")
+
+    for spoilt in (False, True):
+        found = simplify(roller(spoilt))
         assert ("plane strain" in [each.name for each in found.found if each.exact]) != spoilt
 
 

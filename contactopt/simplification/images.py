@@ -87,9 +87,7 @@ def equal_functions(one: Any, other: Any, here: np.ndarray, there: np.ndarray) -
     return bool(np.all(np.abs(a - b) <= EQUAL * size + ROUNDED * size.max(initial=0.0)))
 
 
-def held_space(
-    components: tuple[str, ...], values: Mapping[str, float] | None
-) -> tuple[np.ndarray, np.ndarray]:
+def held_space(components: tuple[str, ...], values: Mapping[str, float] | None) -> tuple[np.ndarray, np.ndarray]:
     """The projection (dim, dim) on the components that have values, and these values (dim,)."""
     values = dict.fromkeys(components, 0.0) if values is None else values
     mask = np.array([component in values for component in components])
@@ -199,10 +197,13 @@ class _Comparison:
             surfaces = self.whole.scene.surfaces_of(image)
             other = next(image.curve_of(s) for s in surfaces if self.fits(part.name, surface, s))
             curve, x = part.curve_of(surface), self.whole.acting(part.name, surface)
-            both = curve is not None and other is not None
-            apart = self.plane.image(curve(x)) - other(self.plane.image(x)) if both else np.zeros(1)
-            if (curve is None) != (other is None) or not np.abs(apart).max() <= ROUNDED * self.whole.size:
-                return f"the curve of body '{part.name}' is not symmetric"
+            if curve is None and other is None:
+                continue
+            if curve is not None and other is not None:
+                apart = np.abs(self.plane.image(curve(x)) - other(self.plane.image(x)))
+                if apart.max() <= ROUNDED * self.whole.size:
+                    continue
+            return f"the curve of body '{part.name}' is not symmetric"
         return ""
 
     def _with_pairs(self, images: dict[str, str], own: set[tuple[str, int]]) -> Images | str:
@@ -211,10 +212,7 @@ class _Comparison:
         swapped: set[str] = set()
         for pair in self.whole.scene.pairs:
             if images.get(pair.bodies[0]) == pair.bodies[1]:
-                return (
-                    f"the contact '{pair.name}' lies in this plane itself, between a body and its own "
-                    "mirror image"
-                )
+                return f"the contact '{pair.name}' lies in this plane itself, between a body and its own mirror image"
             reasons = [f"the contact '{pair.name}' has no mirror image"]
             for other in (pair, *self.whole.scene.pairs):
                 order = self._facing(pair, other, images)
@@ -249,7 +247,7 @@ class _Comparison:
         """Half a sentence if two pairs have different laws, friction, gaps or rigid bodies."""
         if (pair.law, pair.coupling) != (other.law, other.coupling):
             return f"the contact '{pair.name}' has another law or coupling than its mirror image"
-        functions = [(f"friction of contact '{pair.name}'", pair.mu, other.mu)]
+        functions: list[tuple[str, Any, Any]] = [(f"friction of contact '{pair.name}'", pair.mu, other.mu)]
         for side, there in enumerate(order):
             one = self.whole.rigid.get(pair.bodies[side])
             two = self.whole.rigid.get(other.bodies[there])
@@ -257,8 +255,8 @@ class _Comparison:
                 reason = self._conditions_differ(one, two, set())
                 if reason:
                     return reason
-                gaps = [0.0 if gap is None else gap for gap in (one.gap, two.gap)]
-                functions.append((f"gap of rigid body '{one.name}'", *gaps))
+                gap, image = (0.0 if each.gap is None else each.gap for each in (one, two))
+                functions.append((f"gap of rigid body '{one.name}'", gap, image))
         x = np.concatenate([self.whole.acting(*surface) for surface in self.whole.surfaces(pair)], axis=1)
         for what, here, there_too in functions:
             if any(np.ndim(each) for each in (here, there_too) if not callable(each)):

@@ -27,7 +27,7 @@ from contactopt.interface.coupling import Coupling, couple
 from contactopt.problem.certificate import Yardsticks, yardsticks
 from contactopt.problem.laws import make_law
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene import Part, Rigid, Scene
+from contactopt.scenes.scene import Rigid, Scene
 from contactopt.simplification.constants import NEAR
 
 Key = tuple[str, str]  # ("body", its name) or ("pair", its name)
@@ -36,9 +36,7 @@ Key = tuple[str, str]  # ("body", its name) or ("pair", its name)
 Fold = Callable[[Key, np.ndarray], tuple[Key, np.ndarray, np.ndarray]]
 
 
-def certificate_of_whole(
-    whole: Scene, elements: int, zone: float | None, part: Solved, folds: Sequence[Fold]
-) -> float:
+def certificate_of_whole(whole: Scene, elements: int, zone: float | None, part: Solved, folds: Sequence[Fold]) -> float:
     """How far the whole is from solved by what the part's solution says of it.
 
     Parameters
@@ -54,39 +52,37 @@ def certificate_of_whole(
 
     Returns
     -------
-    The largest of the errors in the head of this module [-]; infinite where nodes or contacts of the whole have no place
-    in the part.
+    The largest of the errors in the head of this module [-]; infinite where nodes or contacts of the
+    whole have no place in the part.
     """
-    bodies = {each.name: assemble(whole, each, elements, zone) for each in whole.parts}
+    bodies: dict[str, Any] = {each.name: assemble(whole, each, elements, zone) for each in whole.parts}
     spread = Spread(part, folds)
-    moves = {each.name: spread.displacement(whole, each, bodies[each.name]) for each in whole.parts}
-    if any(U is None for U in moves.values()):
+    errors = [0.0]
+    try:
+        moves = {each.name: spread.displacement(each, bodies[each.name]) for each in whole.parts}
+        forces = {name: np.zeros(len(U)) for name, U in moves.items()}
+        for pair in whole.pairs:
+            upper, lower = pair.bodies
+            made = couple(whole, pair, bodies[upper], bodies[lower])
+            r, measure = spread.reactions(pair, made)
+            u = (made.upper @ moves[upper] - made.lower @ moves[lower]).reshape(r.shape)
+            u[:, 0] += made.gap
+            law = make_law(pair.law, pair.mu, made.areas, made.positions)
+            off = r - law.project(r - measure.rho[:, None] * u)[0]
+            errors.append(float(np.linalg.norm(off, axis=1).max(initial=0.0)) / measure.force)
+            forces[upper] += made.upper.T @ r.ravel()
+            forces[lower] -= made.lower.T @ r.ravel()
+    except LookupError:
         return np.inf
-    forces: dict[str, np.ndarray] = {name: np.zeros(len(U)) for name, U in moves.items() if U is not None}
-    worst = 0.0
-    for pair in whole.pairs:
-        upper, lower = pair.bodies
-        made = couple(whole, pair, bodies[upper], bodies[lower])
-        found = spread.reactions(pair, made)
-        if found is None:
-            return np.inf
-        r, measure = found
-        u = (made.upper @ moves[upper] - made.lower @ moves[lower]).reshape(r.shape)
-        u[:, 0] += made.gap
-        law = make_law(pair.law, pair.mu, made.areas, made.positions)
-        errors = np.linalg.norm(r - law.project(r - measure.rho[:, None] * u)[0], axis=1)
-        worst = max(worst, float(errors.max(initial=0.0)) / measure.force)
-        forces[upper] += made.upper.T @ r.ravel()
-        forces[lower] -= made.lower.T @ r.ravel()
     for each in whole.parts:
         U, F = moves[each.name], forces[each.name]
-        error = _elastic(bodies[each.name].body, U, F) if isinstance(each, Part) else _rigid(whole, each, U, F)
-        worst = max(worst, error)
-    return worst if np.isfinite(worst) else np.inf
+        rigid = isinstance(each, Rigid)
+        errors.append(_rigid(whole, each, U, F) if rigid else _elastic(bodies[each.name].body, U, F))
+    return max(errors) if np.all(np.isfinite(errors)) else np.inf
 
 
 class Spread:
-    """The solution of a part at the places of the whole."""
+    """The solution of a part at the places of the whole; LookupError where a place is none of the part's."""
 
     def __init__(self, part: Solved, folds: Sequence[Fold]):
         self.part, self.folds = part, folds
@@ -105,45 +101,43 @@ class Spread:
             turns = turns @ more
         return key, x, turns
 
-    def displacement(self, whole: Scene, each: Any, body: Any) -> np.ndarray | None:
-        """U of a body of the whole; None where its nodes have no place in the part."""
+    def displacement(self, each: Any, body: Any) -> np.ndarray:
+        """U (n,) of a body of the whole; of a rigid one its translation, and zeros for its forces."""
         if isinstance(each, Rigid):
-            key, _, turns = self.folded(("body", each.name), np.zeros((whole.dim, 1)))
+            dim = len(body.components)
+            key, _, turns = self.folded(("body", each.name), np.zeros((dim, 1)))
             U = self.displaced[key[1]]
-            return np.concatenate([turns[0] @ U[: len(U) // 2], np.zeros(whole.dim)])
+            return np.concatenate([turns[0] @ U[: len(U) // 2], np.zeros(dim)])
         made: Assembly = body.body
         key, x, turns = self.folded(("body", each.name), made.locations)
         own: Assembly = self.bodies[key[1]].body
-        nodes = _nearest(own.locations, x)
-        if nodes is None:
-            return None
+        there = self.displaced[key[1]][own.unknowns][:, _nearest(own.locations, x)]
         U = np.zeros(len(made.load))
-        U[made.unknowns] = np.einsum("kab,bk->ak", turns, self.displaced[key[1]][own.unknowns][:, nodes])
+        U[made.unknowns] = np.einsum("kab,bk->ak", turns, there)
         return U
 
-    def reactions(self, pair: Contact, made: Coupling) -> tuple[np.ndarray, Yardsticks] | None:
+    def reactions(self, pair: Contact, made: Coupling) -> tuple[np.ndarray, Yardsticks]:
         """r (k, dim) of a pair of the whole, from the tractions in the part, and the yardsticks for its natural map."""
         key, x, turns = self.folded(("pair", pair.name), made.positions)
-        problem = self.part.reduction.problem
-        number = next(i for i, own in enumerate(problem.pairs) if own.name == key[1])
-        there, own = self.part.reduction.couplings[number], problem.pairs[number].contacts
+        pairs = self.part.reduction.problem.pairs
+        number = next(i for i, own in enumerate(pairs) if own.name == key[1])
+        there, own = self.part.reduction.couplings[number], pairs[number].contacts
         contacts = _nearest(there.positions, x)
-        if contacts is None:
-            return None
-        force = np.einsum("kac,ka->kc", there.frames, self.part.solution.reactions[own])
+        force = np.einsum("kac,ka->kc", there.frames, self.part.solution.reactions[own])[contacts]
+        # A contact of the part stands for several of the whole, or for a slice of one.
         share = made.areas / np.where(there.areas > 0, there.areas, np.inf)[contacts]
-        vectors = np.einsum("kab,kb->ka", turns, force[contacts]) * share[:, None]
-        # A contact of the part stands for several of the whole, or for a slice of one: forces shrink alike.
-        shrunk = float(np.max(share, initial=0.0)) or 1.0
-        rho = self.measure.rho[own][contacts] * shrunk
-        return np.einsum("kac,kc->ka", made.frames, vectors), Yardsticks(self.measure.force * shrunk, 0.0, rho)
+        r = np.einsum("kca,kab,kb->kc", made.frames, turns, force) * share[:, None]
+        largest = float(share.max(initial=0.0)) or 1.0
+        rho = self.measure.rho[own][contacts] * largest
+        return r, Yardsticks(self.measure.force * largest, 0.0, rho)
 
 
-def _nearest(points: np.ndarray, wanted: np.ndarray) -> np.ndarray | None:
-    """The number of the point that lies at each wanted place; None if one of them has none."""
+def _nearest(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """The number of the point that lies at each wanted place; LookupError if one of them has none."""
     distance, number = KDTree(points.T).query(wanted.T)
-    size = float(np.ptp(points, axis=1).max(initial=0.0))
-    return np.asarray(number) if distance.max(initial=0.0) <= 10 * NEAR * size else None
+    if distance.max(initial=0.0) > 10 * NEAR * float(np.ptp(points, axis=1).max(initial=0.0)):
+        raise LookupError
+    return np.asarray(number)
 
 
 def _elastic(body: Assembly, U: np.ndarray, force: np.ndarray) -> float:
@@ -156,20 +150,19 @@ def _elastic(body: Assembly, U: np.ndarray, force: np.ndarray) -> float:
     beyond = U - body.prescribed
     beyond = beyond - body.motion @ (driven.T @ beyond)
     beyond[body.free] = 0.0
-    size = max(float(np.abs(U).max(initial=0.0)), 1e-300)
-    left = max(float(np.abs(missing[body.free]).max(initial=0.0)), float(np.abs(plates).max(initial=0.0)))
-    return max(left / max(scale, 1e-300), float(np.abs(beyond).max(initial=0.0)) / size)
+    left = np.abs(np.concatenate([missing[body.free], plates])).max(initial=0.0)
+    size = float(np.abs(U).max(initial=0.0))
+    return float(max(left / max(scale, 1e-300), np.abs(beyond).max(initial=0.0) / max(size, 1e-300)))
 
 
-def _rigid(whole: Scene, body: Rigid, U: np.ndarray, force: np.ndarray) -> float:
+def _rigid(whole: Scene, body: Any, U: np.ndarray, force: np.ndarray) -> float:
     """How far a rigid body is from the balance of its forces, and from where it is held."""
-    given, held = body.force or {}, body.displacement or {}
-    error = 0.0
+    errors = [0.0]
     for number, name in enumerate(whole.components):
-        if name in given:
-            scale = max(float(np.abs(force[: whole.dim]).max()), abs(given[name]), 1e-300)
-            error = max(error, abs(float(force[number]) + given[name]) / scale)
+        if name in (body.force or {}):
+            asked, wrong, own = body.force[name], force[number] + body.force[name], force[: whole.dim]
         else:
-            size = max(float(np.abs(U[: whole.dim]).max()), abs(held.get(name, 0.0)), 1e-300)
-            error = max(error, abs(float(U[number]) - held.get(name, 0.0)) / size)
-    return error
+            asked = (body.displacement or {}).get(name, 0.0)
+            wrong, own = U[number] - asked, U[: whole.dim]
+        errors.append(abs(wrong) / max(float(np.abs(own).max()), abs(asked), 1e-300))
+    return float(max(errors))

@@ -51,8 +51,9 @@ class _Prism:
         """The section of a mesh; its edges bear the names of the boundaries that stand on them."""
         corners = mesh.facets[:, self.on_end(mesh, self.ends[0])]
         nodes, cells = np.unique(corners, return_inverse=True)
-        made = skfem.MeshQuad(mesh.p[np.ix_(self.axes, nodes)], cells.reshape(corners.shape))
-        outer, names = made.boundary_facets(), {}
+        made = skfem.MeshQuad(mesh.p[self.axes][:, nodes], cells.reshape(corners.shape))
+        names: dict[str, np.ndarray] = {}
+        outer = made.boundary_facets()
         middles = made.p[:, made.facets[:, outer]].mean(axis=1)
         for name, facets in (mesh.boundaries or {}).items():
             there = mesh.p[self.axes][:, mesh.facets[:, facets]].mean(axis=1)
