@@ -397,9 +397,9 @@ def test_a_report_reads_well_and_names_are_known():
 
 
 def test_the_command_says_what_may_be_left_out_and_run_applies_it(tmp_path, capsys):
-    assert cli.main(["simplify", "arch", "--set", "elements=4"]) == 0
+    assert cli.main(["simplify", "arch", "--set", "elements=2"]) == 0
     assert "needs no more than one half of the bodies" in capsys.readouterr().out
-    run = ["run", "arch", "--elements", "4", "--no-figures", "--simplest", "--out", str(tmp_path / "half")]
+    run = ["run", "arch", "--elements", "2", "--no-figures", "--simplest", "--out", str(tmp_path / "half")]
     assert cli.main(run) == 0
     told = capsys.readouterr()
     assert "needs no more than one half" in told.err and "arch" in told.out

@@ -17,6 +17,10 @@ from contactopt.simplification.whole import Whole, sizes_of, whole_of
 
 ACROSS = 1e-6  # cosine below which two normals are across each other
 UNIQUE = "Exact wherever the solution is unique."
+NONE = (
+    "No plane makes the meshes their own mirror images. To use a symmetry of the bodies, mesh one half of them, hold it in the "
+    "plane along its normal, and set copies = 2."
+)
 
 
 def mirrored(whole: Whole) -> tuple[list[Simplification], list[str]]:
@@ -29,13 +33,16 @@ def mirrored(whole: Whole) -> tuple[list[Simplification], list[str]]:
             f"The scene is symmetric across the plane {planes[0].words(components)}, but is not cut: in a part of the bodies "
             f"{name}, which holds a contact along one axis, would count as a plane of symmetry, too.",
         ]
+    if not planes and not notes and whole.scene.copies == 1 and whole.scene.kind != "axisymmetric":
+        notes.append(NONE)
     found: list[Simplification] = []
     for plane in planes:
         images, where = images_under(whole, plane), plane.words(components)
         if not isinstance(images, Images):
             continue
         if np.count_nonzero(plane.normal) > 1:
-            notes.append(f"The scene is symmetric across the plane {where}; turn it so that this is across an axis.")
+            if not found and whole.scene.copies == 1:
+                notes.append(f"The scene is symmetric across the plane {where}; turn it so that this is across an axis.")
             continue
         try:
             scene, fold = half_of(whole, plane, images)
