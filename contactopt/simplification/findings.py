@@ -45,7 +45,7 @@ class Simplification:
 
     @property
     def exact(self) -> bool:
-        """Whether its answer is proved to be that of the whole scene, by the certificate of the whole."""
+        """Whether the certificate of the whole proves that its answer is that of the whole."""
         return self.proof is not None and self.proof <= PROVED
 
     @property

@@ -1,8 +1,9 @@
-"""One half of a scene that is its own mirror image across a plane normal to an axis: bodies, supports, loads and contacts.
+"""One half of a scene that is its own mirror image across a plane normal to an axis.
 
-`Scene.copies` doubles, so that forces, reactions and areas stay those of the whole. What the plane cuts keeps the half on the
-positive side and is held there along the normal. Of two bodies, contacts or plates that are each other's images the one on
-the positive side stays, and stands for both: its forces are those of both together. No element is cut.
+`Scene.copies` doubles, so that forces, reactions and areas stay those of the whole. What the plane
+cuts keeps the half on the positive side and is held there along the normal. Of two bodies, contacts
+or plates that are each other's images the one on the positive side stays, and stands for both: its
+forces are those of both together. No element is cut.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from contactopt.simplification.whole import Whole, of_mesh, with_pairs
 
 
 def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
-    """The half on the positive side of a plane of symmetry that is normal to an axis, and how the whole lies on it.
+    """The half on the positive side of a plane across an axis, and how the whole lies on it.
 
     Raises InputError if the plane runs through elements.
     """
@@ -58,7 +59,7 @@ def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
 
 
 def half_mesh(plane: Plane, cut: str) -> Callable[[Any], Any]:
-    """The function that takes the elements on the positive side of a plane, with a boundary of that name in it."""
+    """The function that takes the elements above a plane, with a boundary of that name in it."""
 
     def change(mesh: Any) -> Any:
         near = NEAR * float(np.ptp(mesh.p, axis=1).max())
@@ -87,9 +88,10 @@ def _restricted(mesh: Any, elements: np.ndarray) -> Any:
 
 
 def roller(whole: Whole) -> str:
-    """The name of a support that holds one component of contacts in a plane across it; empty if there is none.
+    """A support that holds one component of contacts in a plane across it; empty if there is none.
 
-    In a scene of mirror images such a support is a plane of symmetry (contactopt.interface.charts), in a whole scene it is not.
+    In a scene of mirror images such a support is a plane of symmetry
+    (contactopt.interface.charts), in a whole scene it is not.
     """
     for name, part in whole.parts.items():
         mesh = whole.meshes[name]
@@ -104,7 +106,7 @@ def roller(whole: Whole) -> str:
 
 
 def _keeps(pair: Any, whole: Whole, images: Images, kept: set[str], plane: Plane) -> bool:
-    """Whether a pair belongs to the half: those whose images are other pairs stay on one side only."""
+    """Whether a pair belongs to the half: of two that are images one stays, on the positive side."""
     elastic = [name for name in pair.bodies if name in whole.meshes]
     if any(name not in kept for name in elastic):
         return False
@@ -116,7 +118,7 @@ def _keeps(pair: Any, whole: Whole, images: Images, kept: set[str], plane: Plane
 
 
 def _half_rigid(images: Images, part: Rigid, component: str) -> Rigid:
-    """A rigid body that the plane cuts is held along the normal; one that stands for two takes the force of both."""
+    """Held along the normal if the plane cuts it, with both forces if it stands for two."""
     if images.bodies[part.name] != part.name:
         return replace(part, force=_doubled(part.force))
     return replace(part, force=_without(part.force, component), displacement=_without(part.displacement, component))

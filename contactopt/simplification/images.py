@@ -1,9 +1,10 @@
-"""Whether a scene is its own mirror image: meshes, materials, supports, loads, laws, friction and gaps.
+"""Whether a scene is its own mirror image: meshes, materials, supports, loads, laws, friction and
+gaps.
 
-A mesh is its own image, or that of another body, if every node and every element has one. The solution
-of the whole scene is then its own image, too, on this mesh and to the last digits. Boundaries are
-compared by their facets, and functions of the place at the nodes and between them. Nothing is read
-from names.
+A mesh is its own image, or that of another body, if every node and every element has one. The
+solution of the whole scene is then its own image, too, on this mesh and to the last digits.
+Boundaries are compared by their facets, and functions of the place at the nodes and between them.
+Nothing is read from names.
 """
 
 from __future__ import annotations
@@ -127,7 +128,7 @@ def _cells(cells: np.ndarray) -> np.ndarray:
 
 
 def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[tuple[str, str, Any, Any, Any]]:
-    """Of a body: words, the boundary, the projection on components, the values there, the object."""
+    """Of a body: words, boundary, projection on components, values there, the object."""
     if not isinstance(part, Part):
         for what in ("force", "displacement"):
             yield what, "", *held_space(components, getattr(part, what) or {}), None
@@ -230,7 +231,7 @@ class _Comparison:
         return Images(images, found, frozenset(own), frozenset(swapped))
 
     def _facing(self, pair: Contact, other: Contact, images: Mapping[str, str]) -> tuple[int, int] | None:
-        """Which sides of the other pair are the images of the upper and the lower side of this one."""
+        """Which sides of the other pair are the images of the upper and the lower one."""
         for order in ((0, 1), (1, 0)):
             for side, there in enumerate(order):
                 body, image = pair.bodies[side], other.bodies[there]

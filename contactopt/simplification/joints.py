@@ -1,9 +1,9 @@
 """Pairs of surfaces that loads neither open nor make slip, and pairs whose friction hardly acts.
 
-One solve on a coarse mesh tells them apart. What leaving them out changes is measured on the same mesh:
-the elastic energy, and the contact forces and largest pressures of all pairs. Whether the assumption
-holds in the end is read from the solution of the simplified scene, because the forces of a tied pair
-say whether it would have opened or slipped.
+One solve on a coarse mesh tells them apart. What leaving them out changes is measured on the same
+mesh: the elastic energy, and the contact forces and largest pressures of all pairs. Whether the
+assumption holds in the end is read from the solution of the simplified scene, because the forces of
+a tied pair say whether it would have opened or slipped.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ROUGH = Options(tol=1e-6)
 
 
 def coarse(scene: Scene) -> Solved:
-    """The scene solved with a quarter of its elements across the contact, unless its meshes are given."""
+    """The scene solved with a quarter of its elements, unless its meshes are given."""
     return solve_scene(scene, max(COARSEST, scene.elements // 4), options=ROUGH)
 
 
@@ -58,7 +58,7 @@ def offered_joints(scene: Scene, solved: Solved) -> list[Simplification]:
 def _offer(
     scene: Scene, solved: Solved, names: list[str], law: str, what: str, why: str, verdict: Any
 ) -> Simplification | None:
-    """Another law for some pairs, with what it changes; None without pairs and without a solution."""
+    """Another law for some pairs, with what it changes; None without pairs or a solution."""
     if not names:
         return None
     pairs = [replace(pair, law=law, mu=0.0) if pair.name in names else pair for pair in scene.pairs]
@@ -79,7 +79,7 @@ def _offer(
 
 
 def _use_of_friction(solved: Solved, pair: Pair, value: Any) -> float:
-    """The largest |r_t| over mu r_n of a pair's contacts; infinite if one of them is open or pulls."""
+    """The largest |r_t| / (mu r_n) of a pair; infinite if a contact is open or pulls."""
     r = solved.solution.reactions[pair.contacts]
     mu = value(solved.reduction.problem.coordinates[:, pair.contacts]) if callable(value) else value
     if np.any(r[:, 0] <= 1e-6 * np.abs(r[:, 0]).max(initial=0.0)):
@@ -97,7 +97,7 @@ def _rubbing(solved: Solved, pair: Pair) -> float:
 
 
 def _change(one: Solved, other: Solved) -> float:
-    """The largest relative change of energy, and of the contact forces and largest pressures of pairs.
+    """The largest relative change of energy, contact forces and largest pressures.
 
     Forces and pressures are compared with the largest ones of the scene.
     """
@@ -109,7 +109,7 @@ def _change(one: Solved, other: Solved) -> float:
 
 
 def _readings(solved: Solved) -> tuple[np.ndarray, ...]:
-    """Energy (1, 1), and of each pair the force (pairs, dim) and the largest pressure (pairs, 1)."""
+    """Energy (1, 1), and forces (pairs, dim) and largest pressures (pairs, 1)."""
     problem, r = solved.reduction.problem, solved.solution.reactions
     pressure = r[:, 0] / np.maximum(problem.areas, 1e-300)
     return (
@@ -120,7 +120,7 @@ def _readings(solved: Solved) -> tuple[np.ndarray, ...]:
 
 
 def _verdict_on_ties(friction: Mapping[str, Any]) -> Callable[[list[str], Solved], str]:
-    """The function that says, of the solution of the scene with pairs tied, whether they would have held."""
+    """The function that says, of a solution with pairs tied, whether they would have held."""
 
     def verdict(names: list[str], solved: Solved) -> str:
         broken = []

@@ -1,10 +1,11 @@
 """Half-spaces instead of bodies that are large beside their contact.
 
-One coarse solve gives the half-width a of the contact, the total force, and the gap about it, which a
-polynomial of the distance continues. Two errors remain for the peak pressure, both measured on Hertz's
-contact (contactopt.simplification.constants): that of a body that ends at the distance L from the
-contact, FINITE (a / L)^2, and that of a surface that is not flat, STEEP times the square of its slope at
-the edge of the contact. The approach is not the same: it depends on the whole bodies.
+One coarse solve gives the half-width a of the contact, the total force, and the gap about it, which
+a polynomial of the distance continues. Two errors remain for the peak pressure, both measured on
+Hertz's contact (contactopt.simplification.constants): that of a body that ends at the distance L
+from the contact, FINITE (a / L)^2, and that of a surface that is not flat, STEEP times the square
+of its slope at the edge of the contact. The approach is not the same: it depends on the whole
+bodies.
 """
 
 from __future__ import annotations
@@ -113,7 +114,7 @@ def spot_of(solved: Solved) -> Spot | str:
 def _gap(
     distance: np.ndarray, gap: np.ndarray, a: float
 ) -> tuple[Callable[[np.ndarray], np.ndarray], float, float] | str:
-    """An even polynomial of fourth degree through the gap about a contact, its slope at the edge, its misfit."""
+    """An even polynomial through the gap about a contact, its slope at the edge, its misfit."""
     near = distance <= RINGS * a
     s = distance[near] / a
     if len(np.unique(np.round(s, 6))) < 5:
@@ -130,7 +131,7 @@ def _gap(
 
 
 def _size(solved: Solved, touching: np.ndarray) -> float:
-    """Distance from the contact to the nearest side of a body that does not go on from its surface [length]."""
+    """Distance from the contact to the nearest side that does not go on from its surface."""
     reduction, scene, least = solved.reduction, solved.reduction.scene, np.inf
     centre = reduction.problem.coordinates[:, touching].mean(axis=1, keepdims=True)
     for part, made in zip(scene.parts, reduction.bodies):
@@ -152,7 +153,7 @@ def _size(solved: Solved, touching: np.ndarray) -> float:
 
 
 def as_half_spaces(scene: Scene, spot: Spot) -> Scene:
-    """The contact between half-spaces, with the same materials, friction and total force, in axes of its own."""
+    """The contact between half-spaces of the same materials, in axes of its own."""
     dim = 2 if scene.kind == "plane-strain" else 3
     reach = REACH * spot.half_width
 

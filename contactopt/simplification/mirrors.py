@@ -1,6 +1,7 @@
 """Planes across which a scene is its own mirror image, and the parts of it that they leave.
 
-The plane lies in the middle between the outermost nodes, across an axis of space or across a principal axis of the nodes.
+The plane lies in the middle between the outermost nodes, across an axis of space or across a
+principal axis of the nodes.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ NONE = (
 
 
 def mirrored(whole: Whole) -> tuple[list[Simplification], list[str]]:
-    """One half after the other, across planes of symmetry that are normal to each other, and what is in the way."""
+    """One half after the other, across planes of symmetry, and what is in the way."""
     planes, notes = find_planes(whole)
     components = whole.scene.components
     if planes and whole.scene.copies == 1 and (name := roller(whole)):
@@ -42,7 +43,9 @@ def mirrored(whole: Whole) -> tuple[list[Simplification], list[str]]:
             continue
         if np.count_nonzero(plane.normal) > 1:
             if not found and whole.scene.copies == 1:
-                notes.append(f"The scene is symmetric across the plane {where}; turn it so that this is across an axis.")
+                notes.append(
+                    f"The scene is symmetric across the plane {where}; turn it so that this is across an axis."
+                )
             continue
         try:
             scene, fold = half_of(whole, plane, images)
@@ -67,7 +70,7 @@ def _why(images: Images) -> str:
 
 
 def find_planes(whole: Whole) -> tuple[list[Plane], list[str]]:
-    """All planes of mirror symmetry, and sentences about planes that only loads, supports, laws or gaps spoil."""
+    """All planes of symmetry, and sentences about those that something else than meshes spoils."""
     found: list[Plane] = []
     spoilt: dict[str, Plane] = {}  # by the reason
     for plane in _candidates(whole):

@@ -1,15 +1,16 @@
 """The proof that the part of a scene answers for the whole: one certificate of the whole.
 
-The part is solved. Its displacements and its contact tractions are mirrored, turned or drawn out to all nodes and contacts of
-the whole, which is assembled on its own meshes, with its own loads, gaps and friction. What is computed then contains nothing
-of the part but these numbers:
+The part is solved. Its displacements and its contact tractions are mirrored, turned or drawn out to
+all nodes and contacts of the whole, which is assembled on its own meshes, with its own loads, gaps
+and friction. What is computed then contains nothing of the part but these numbers:
 
     equilibrium   |A U - f - B' r| on unknowns that are free and the total forces of plates and rigid bodies, over the largest
                   force on a node or plate
     supports      |U - g| on unknowns that are held, over the largest displacement of the body
     contact       |r_i - P(r_i - rho_i u_i)| / F, the natural map at every contact, as in contactopt.problem.certificate
 
-This takes products with the stiffness of the whole and no solve, so that it costs less than what the part saves.
+This takes products with the stiffness of the whole and no solve, so that it costs less than what
+the part saves.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ def certificate_of_whole(whole: Scene, elements: int, zone: float | None, part: 
 
 
 class Spread:
-    """The solution of a part at the places of the whole; LookupError where a place is none of the part's."""
+    """The solution of a part at the places of the whole; LookupError where the part has none."""
 
     def __init__(self, part: Solved, folds: Sequence[Fold]):
         self.part, self.folds = part, folds
@@ -117,7 +118,7 @@ class Spread:
         return U
 
     def reactions(self, pair: Contact, made: Coupling) -> tuple[np.ndarray, Yardsticks]:
-        """r (k, dim) of a pair of the whole, from the tractions in the part, and the yardsticks for its natural map."""
+        """r (k, dim) of a pair of the whole, and the yardsticks for its natural map."""
         key, x, turns = self.folded(("pair", pair.name), made.positions)
         pairs = self.part.reduction.problem.pairs
         number = next(i for i, own in enumerate(pairs) if own.name == key[1])
@@ -133,7 +134,7 @@ class Spread:
 
 
 def _nearest(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """The number of the point that lies at each wanted place; LookupError if one of them has none."""
+    """The number of the point at each wanted place; LookupError if one of them has none."""
     distance, number = KDTree(points.T).query(wanted.T)
     if distance.max(initial=0.0) > 10 * NEAR * float(np.ptp(points, axis=1).max(initial=0.0)):
         raise LookupError

@@ -113,7 +113,7 @@ def _chains(scene: Scene) -> Iterator[Found]:
 def _proved(
     scene: Scene, chain: list[Simplification], options: Options
 ) -> tuple[list[Simplification], list[str], Solved | None]:
-    """As much of a chain as the certificate of the whole proves, and the solution of what is left."""
+    """As much of a chain as the certificate of the whole proves, and its solution."""
     notes: list[str] = []
     unknowns = sizes_of(scene)[0]
     while chain:

@@ -60,7 +60,7 @@ class Whole:
         return [(body, boundary) for body, boundary in named if boundary]
 
     def acting(self, body: str, boundary: str) -> np.ndarray:
-        """(dim, s) where gap and friction act: the nodes of a boundary and points between them, on its curve as well."""
+        """(dim, s) nodes of a boundary and points between them, on its curve as well."""
         if (body, boundary) not in self._acting:
             corners, curve = self.corners(body, boundary), self.parts[body].curve_of(boundary)
             x = lattice_points(corners)
@@ -74,7 +74,7 @@ class Whole:
 
 
 def lattice_points(corners: np.ndarray) -> np.ndarray:
-    """(dim, s) evenly spaced points of facets with these corners (dim, n, m), the corners themselves among them."""
+    """(dim, s) evenly spaced points of facets with corners (dim, n, m), which are among them."""
     t = np.linspace(0.0, 1.0, BETWEEN + 1)
     a, b = (grid.ravel() for grid in np.meshgrid(t, t))
     inside = a + b <= 1 + 1e-12
@@ -87,7 +87,7 @@ def lattice_points(corners: np.ndarray) -> np.ndarray:
 
 
 def whole_of(scene: Scene) -> Whole | None:
-    """The scene with meshes for its own number of elements; None where a body is a half-space or lives elsewhere."""
+    """The scene with its meshes; None where a body is a half-space or lives elsewhere."""
     if not all(isinstance(part, (Part, Rigid)) for part in scene.parts):
         return None
     parts = [part for part in scene.parts if isinstance(part, Part)]
@@ -98,9 +98,9 @@ def whole_of(scene: Scene) -> Whole | None:
 
 
 def sizes_of(scene: Scene) -> tuple[int, int]:
-    """Displacement unknowns and contacts of a scene that are not tied, counted from its meshes without assembling anything.
+    """Displacement unknowns and contacts that are not tied, counted from the meshes alone.
 
-    Contacts are the nodes of the finer surface of each pair; supports and what faces nothing are not taken off.
+    Contacts are the nodes of the finer surface of each pair; supports are not taken off.
     """
     unknowns, nodes = 0, {}
     for part in scene.parts:
@@ -124,14 +124,14 @@ def sizes_of(scene: Scene) -> tuple[int, int]:
 
 
 def with_pairs(scene: Scene, pairs: tuple[Contact, ...]) -> Scene:
-    """The scene with other pairs of surfaces; it keeps its short form if it has one and the new pair fits into it."""
+    """The scene with other pairs of surfaces, in its short form if it has one and they fit."""
     if scene.contacts or len(pairs) != 1:
         return replace(scene, upper=None, lower=None, mu=None, law="coulomb", bodies=scene.parts, contacts=pairs)
     return replace(scene, mu=pairs[0].mu, law=pairs[0].law)
 
 
 def of_mesh(mesh: Any, change: Callable[[Any], Any]) -> Any:
-    """A changed mesh, or the function that makes it where the mesh is made for a number of elements."""
+    """A changed mesh, or the function that makes it where the mesh is a function."""
     if callable(mesh):
         return lambda elements, zone: change(mesh(elements, zone))
     return change(mesh)

@@ -50,7 +50,8 @@ def block(rng: np.random.Generator, spoil: float) -> Scene:
         return friction * (1 + 0.1 * np.abs(p[0] - middle)) + (spoil * there(p) if way == 1 else 0.0)
 
     pull = (Traction("x+", (spoil, 0.0)),) if way == 3 else ()
-    force = {"x": spoil * 0.1 if way == 2 else 0.0, "y": -(10 ** rng.uniform(-2, 0.5))}
+    weight = 10 ** rng.uniform(-2, 0.5)
+    force = {"x": spoil * friction * weight if way == 2 else 0.0, "y": -weight}
     return Scene(
         "block", Rigid("indenter", (0.0, 1.0), gap, force), Part("block", mesh, SOFT, (Support("bottom"),), pull), mu
     )
