@@ -266,9 +266,7 @@ def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
     return cells.t[:, best], float(beyond[best])
 
 
-def _patches(
-    mesh: Any, seeds: sp.csr_matrix, sources: np.ndarray, mirrored: np.ndarray, least: float
-) -> sp.csr_matrix:
+def _patches(mesh: Any, seeds: sp.csr_matrix, sources: np.ndarray, mirrored: np.ndarray, least: float) -> sp.csr_matrix:
     """Mask (m, elements) of the elements that make each patch.
 
     With their mirror images beyond the planes of symmetry of `mirrored` (dim, nodes) they are at least `least` where the mesh

@@ -9,8 +9,9 @@ and friction. What is computed then contains nothing of the part but these numbe
     supports      |U - g| on unknowns that are held, over the largest displacement of the body
     contact       |r_i - P(r_i - rho_i u_i)| / F, the natural map at every contact, as in contactopt.problem.certificate
 
-This takes products with the stiffness of the whole and no solve, so that it costs less than what
-the part saves.
+This takes products with the stiffness of the whole and no solve. In space it costs much less than the
+part saves. In the plane, where assembling is most of the work, a part pays if it is solved more than
+once, as in a search for an accuracy.
 """
 
 from __future__ import annotations

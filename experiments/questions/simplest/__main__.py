@@ -48,7 +48,9 @@ coupled a little differently there, and the proof refuses it.
 
 ## The price of the proof
 
-Processor seconds of the whole scene, and of its part with the proof.
+Processor seconds of the whole scene, and of its part with the proof. The proof assembles the whole and does not solve it. This pays in
+space. In the plane, where assembling is most of the work, one solve of the whole costs less than a half and its proof; a half pays
+where it is solved more than once, as in a search for an accuracy.
 
 {{prices}}
 
