@@ -43,8 +43,8 @@ solution. Wrong is a difference above 1e-4.
 
 {{nearly}}
 
-Symmetric scenes that are not called exact are those whose contacts are coupled by mortar integrals at the plane itself: a half is
-coupled a little differently there, and the proof refuses it.
+The symmetric punches that are not called exact stand on facets half as long as their own. Mortar integrals over surfaces whose nodes do
+not lie on each other treat the neighbours of the plane a little differently in a half, by about 1e-4. The proof refuses that.
 
 ## The price of the proof
 
