@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from contactopt.analysis.diagnosis import Diagnosis, diagnose
     from contactopt.analysis.enumeration import all_solutions
     from contactopt.analysis.paths import PathResult, follow
-    from contactopt.analysis.simplest.report import Simplification, Simplified
-    from contactopt.analysis.simplest.search import simplify
     from contactopt.analytic import Reference
     from contactopt.bodies.fields import Fields
     from contactopt.derivatives.design import Design, design
@@ -35,6 +33,8 @@ if TYPE_CHECKING:
     from contactopt.scenes.contact import Contact
     from contactopt.scenes.mesh_files import load_mesh
     from contactopt.scenes.scene import BodyForce, HalfSpace, Part, Plate, Rigid, Scene, Support, Traction
+    from contactopt.simplification.findings import Simplification, Simplified
+    from contactopt.simplification.search import simplify
     from contactopt.solving.driver import solve
 
 # name -> the module that it stands in
@@ -43,8 +43,8 @@ _HOMES = {
     "analysis.diagnosis": ("Diagnosis", "diagnose"),
     "analysis.enumeration": ("all_solutions",),
     "analysis.paths": ("PathResult", "follow"),
-    "analysis.simplest.report": ("Simplification", "Simplified"),
-    "analysis.simplest.search": ("simplify",),
+    "simplification.findings": ("Simplification", "Simplified"),
+    "simplification.search": ("simplify",),
     "derivatives.design": ("Design", "design"),
     "derivatives.fit": ("Fit", "fit"),
     "derivatives.gradient": ("gradient",),

@@ -181,7 +181,8 @@ def run(
         further mesh is begun that would pass one; the result is then the best answer so far, with its estimate
         All arguments from `method` to here may stand in a scene file; those given here win.
     simplest : whether all that can be left out exactly is left out first: halves across planes of symmetry, the third dimension of
-        plates between rollers and of bodies of revolution (contactopt.simplify). `Result.scene` is what was solved
+        plates between rollers (contactopt.simplify). The certificate of the whole proves it on the first mesh, or the whole is
+        solved. `Result.scene` is what was solved
     figures : the formats in which figures are written, of png, svg and pdf; (): none are drawn, which saves half of the time
         of a small scene
     html : whether to write view.html too, the result as a page to explore (needs `pip install 'contactopt[view]'`)
@@ -207,7 +208,6 @@ def run(
 
     changes |= {} if elements is None else {"elements": elements}
     states = _states(scene, changes) if file is None else _states_of_file(file, changes)
-    states = _simplest(states, note) if simplest else states
     names = {"normal": normal, "tangential": tangential, "preconditioner": preconditioner}
     given = {key: choose(key, name) for key, name in names.items() if choose(key, name) is not None}
     method = choose("method", method) or default_method(given)
@@ -224,13 +224,18 @@ def run(
     backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
     form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
     options = Options(form, choose("solver", solver, "auto"), chosen, choose("tol", tol, 1e-8), note=note)
+    known = None
+    if simplest:
+        states, known = _simplest(states, options)
+        backends = chosen.backends(states[-1].dim)
     if team is not None:
         idle = team.size - sum(isinstance(part, Part) for part in states[-1].parts)
         if idle > 0:
             note(f"{idle} of {team.size} ranks have nothing to do: there are no more elastic bodies")
         states = tuple(spread(state, team) for state in states)
     try:
-        return _finish(states, out, files, method, backends, options, aim, start)
+        known = known if team is None and aim is None else None
+        return _finish(states, out, files, (method, *backends), options, aim, start, known)
     except InputError as error:
         raise error if file is None else file.located(error) from error
 
@@ -250,20 +255,23 @@ def _finish(
     states: tuple[Scene, ...],
     out: str | Path | None,
     files: tuple[str, ...],
-    method: str,
-    backends: tuple[str, str],
+    names: tuple[str, str, str],
     options: Options,
     aim: Aim | None,
     start: float,
+    known: Solved | None,
 ) -> Result:
-    """Solve the states, and write figures and files; `start` is when the clock began."""
+    """Solve the states, unless the solution is known, and write figures and files.
+
+    `names` are those of the method and its backends; `start` is when the clock began.
+    """
     if out is not None:
         check_folder(Path(out))
-    solved, path, estimate = _solve(states, aim, options)
+    solved, path, estimate = _solve(states, aim, options) if known is None else (known, None, None)
     seconds = dict(solved.solution.seconds)
     with _clock(seconds, "recover"):
         fields = recover(solved.reduction, solved.solution)
-    summary = _summary(solved, method, backends, path, estimate)
+    summary = _summary(solved, names[0], names[1:], path, estimate)
     made = Result(
         solved.reduction.scene, solved.reduction, solved.solution, fields, solved.zones, summary, path, estimate
     )
@@ -331,18 +339,17 @@ def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:
     return (_states(scene, changes) if file is None else _states_of_file(file, changes))[-1]
 
 
-def _simplest(states: tuple[Scene, ...], note: Note) -> tuple[Scene, ...]:
-    """The scene after all exact simplifications."""
+def _simplest(states: tuple[Scene, ...], options: Options) -> tuple[tuple[Scene, ...], Solved | None]:
+    """The scene after all exact simplifications, and its solution, which proved them on its first mesh."""
     if len(states) > 1:
         raise InputError(
             f"scene '{states[0].name}' has a load path, whose states would all have to be symmetric; ask contactopt.simplify "
             "for each state."
         )
-    from contactopt.analysis.simplest import simplify
+    from contactopt.simplification.search import proved_part
 
-    found = simplify(states[0], solve=False)
-    note(found.needs)
-    return (found.scene,)
+    found, solved = proved_part(states[0], options)
+    return (found.scene,), solved
 
 
 def _form(Q: str, preconditioner: str | None) -> str:

@@ -123,3 +123,11 @@ def test_every_command_that_is_named_somewhere_exists():
     }
     assert len(named) > 5
     assert not [(module, path) for module, path in sorted(named) if find_spec(module) is None]
+
+
+def test_what_is_called_exact_of_nearly_symmetric_scenes_is_right():
+    from experiments.questions.simplest import nearly
+
+    checks = [nearly.checked(number) for number in (4, 13, 17, 31, 1, 3)]
+    assert [bool(row["exact"]) for row in checks] == [row["spoilt by"] == 0 for row in checks]
+    assert max(row["certificate"] for row in checks) < 1e-8 and sum(row["wrong"] for row in nearly.table(checks)) == 0

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from skfem.helpers import dot
 
 from contactopt.bodies.elements import SHAPES, Trace, contact_trace, make_basis, node_unknowns, straight, weight_at
+from contactopt.bodies.mirror_planes import mirrored_nodes
 from contactopt.bodies.motions import Motions, check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness, stiffness
 from contactopt.errors import InputError
@@ -37,6 +38,7 @@ class Assembly:
     rigid_motions  rigid motions that no support and no plate holds
     driven  what each column of `motion` is, for messages
     holders name of each support and plate -> the unknowns that it holds or drives, each unknown with one of them
+    mirrored (dim, n / dim) nodes in planes across an axis beyond which the body goes on as its mirror image
     """
 
     name: str
@@ -54,6 +56,7 @@ class Assembly:
     rigid_motions: Motions
     driven: tuple[str, ...]
     holders: Mapping[str, np.ndarray]
+    mirrored: np.ndarray
 
     @property
     def trace(self) -> Trace:
@@ -174,6 +177,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         rigid_motions,
         driven,
         holders,
+        mirrored_nodes(scene, part, basis, held),
     )
 
 
@@ -200,7 +204,9 @@ def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     prescribed, held, motion, plate_forces, *_ = _constraints(scene, part, body.basis)
     if not np.array_equal(np.flatnonzero(~held), body.free) or not np.array_equal(motion, body.motion):
         raise InputError(f"body '{part.name}': supports or plates hold other unknowns than before; reduce it anew.")
-    return replace(body, load=_load(part, body.basis, body.weight), prescribed=prescribed, plate_forces=plate_forces)
+    mirrored = mirrored_nodes(scene, part, body.basis, held)
+    load = _load(part, body.basis, body.weight)
+    return replace(body, load=load, prescribed=prescribed, plate_forces=plate_forces, mirrored=mirrored)
 
 
 def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:

@@ -90,7 +90,7 @@ def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.n
     """Stress tensor (3, 3, n) at the nodes of a body, averaged over the elements with their volumes.
 
     An element counts with its mean stress where the displacement is linear, with its stress at the node where it is
-    quadratic. Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
+    quadratic; at planes of symmetry its mirror image counts as well, so that no shear is left across them. Axes are x, y, z or, in an axisymmetric scene, r, z, theta.
 
     everywhere  whether at all nodes of a quadratic displacement, or at the vertices of the mesh alone
     """
@@ -113,6 +113,9 @@ def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.n
     for i in range(3):
         for j in range(3):
             total[i, j] = np.bincount(where, (values[i, j] * volume[:, None]).ravel(), count)
+    for axis, there in enumerate(body.mirrored[:, :count]):
+        total[axis, :axis, there] = total[axis, axis + 1 :, there] = 0.0
+        total[:axis, axis, there] = total[axis + 1 :, axis, there] = 0.0
     return total / weight
 
 

@@ -7,7 +7,9 @@ Around a place x the stresses s_h of the elements near it are fitted by a polyno
 with one coefficient vector a per component. The points x_q are those at which the stress of an element is most accurate: its
 centre where the displacement is linear, the Gauss points of order two where it is quadratic. The patch of a vertex is made of
 the elements around it; that of a vertex on the boundary also of the elements around its neighbours, since there the fit looks
-from one side. The patch of another point is made of the elements around the vertices of the element that holds it.
+from one side. The patch of another point is made of the elements around the vertices of the element that holds it. A patch at a
+plane of symmetry holds the mirror images of its elements, too: the shear across the plane, which changes its sign there, is
+zero, and the other components are fitted from both sides.
 
 The element stress is linear in the displacement, s_h = D U, and the coefficients c depend on the mesh alone: s* = R D U. So a
 function f of the recovered stress has the derivative D' R' df/ds* by U. The load of its adjoint problem is the transpose of
@@ -51,6 +53,7 @@ class StressMap:
     sources  (m,) vertices of the mesh, -1 for a place that is none
     fit      of the stresses of the elements around each place
     used     numbers of the elements whose stresses are fitted
+    even     (m, 4 or 6) 0 for the shear across a plane of symmetry at a place in it, else 1
     body, basis, constants  of the element stress: the quadrature points, and the constants lambda and mu of the material
     """
 
@@ -58,6 +61,7 @@ class StressMap:
     sources: np.ndarray
     fit: PatchFit
     used: np.ndarray
+    even: np.ndarray
     body: Assembly
     basis: skfem.CellBasis
     constants: tuple[float, float]
@@ -75,7 +79,7 @@ class StressMap:
         (m, 4 or 6) array
             The stress at every place, components as in contactopt.bodies.fields.STRESSES.
         """
-        return np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1)
+        return np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1) * self.even
 
     def deviation(self, U: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """Estimate how uncertain a function of the recovered stress is.
@@ -94,7 +98,7 @@ class StressMap:
         (m,) array
             Its standard error at every place.
         """
-        columns = zip(self._element_stress, slopes.T)
+        columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(np.sqrt(sum((slope * self.fit.deviation(rows @ U)) ** 2 for rows, slope in columns)))
 
     def elements(self, places: np.ndarray) -> np.ndarray:
@@ -126,7 +130,7 @@ class StressMap:
         (n,) array
             Its derivative by the displacement U.
         """
-        columns = zip(self._element_stress, slopes.T)
+        columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(sum(rows.T @ (self.weights.T @ slope) for rows, slope in columns))
 
     def size(self, number: int) -> float:
@@ -193,7 +197,8 @@ def stress_map(body: Assembly, region: Region, by_poisson: bool = False) -> Stre
     places, sources, seeds = _places(body.name, mesh, region)
     terms = _terms(len(mesh.p), body.degree)
     reference = get_quadrature(body.basis.mesh.refdom, 2 if body.degree == 2 else 1)
-    patches = _patches(mesh, seeds, sources, POINTS * len(terms) / len(reference[1]))
+    in_plane = body.mirrored[:, sources] & (sources >= 0)
+    patches = _patches(mesh, seeds, sources, body.mirrored, POINTS * len(terms) / len(reference[1]))
     used = np.unique(patches.indices)
     basis = skfem.Basis(body.basis.mesh, body.basis.elem, elements=used, quadrature=reference)
     row = np.repeat(np.arange(len(sources)), np.diff(patches.indptr))
@@ -201,9 +206,24 @@ def stress_map(body: Assembly, region: Region, by_poisson: bool = False) -> Stre
     points = (np.searchsorted(used, patches.indices)[:, None] * count + np.arange(count)).ravel()
     row = np.repeat(row, count)
     at = np.asarray(basis.global_coordinates()).reshape(len(mesh.p), -1)
-    fit = _fit(at[:, points] - places[:, row], row, points, len(sources), terms)
+    fit = _fit(*_both_sides(at[:, points] - places[:, row], row, points, in_plane), len(sources), terms)
     constants = lame_by_poisson(body.material) if by_poisson else lame(body.material)
-    return StressMap(places, sources, fit, used, body, basis, constants)
+    mirrored = np.concatenate([in_plane, np.zeros((3 - len(in_plane), len(sources)), dtype=bool)])
+    even = np.stack([~(mirrored[i] ^ mirrored[j]) for i, j in PLACES[len(mesh.p)]], axis=1).astype(float)
+    return StressMap(places, sources, fit, used, even, body, basis, constants)
+
+
+def _both_sides(
+    offset: np.ndarray, row: np.ndarray, column: np.ndarray, in_plane: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points of patches with their mirror images across the planes (dim, m) in which their places lie."""
+    for axis, there in enumerate(in_plane):
+        images = np.flatnonzero(there[row])
+        other = offset[:, images].copy()
+        other[axis] *= -1
+        offset = np.concatenate([offset, other], axis=1)
+        row, column = np.concatenate([row, row[images]]), np.concatenate([column, column[images]])
+    return offset, row, column
 
 
 def _places(name: str, mesh: Any, region: Region) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
@@ -246,20 +266,27 @@ def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
     return cells.t[:, best], float(beyond[best])
 
 
-def _patches(mesh: Any, seeds: sp.csr_matrix, sources: np.ndarray, least: float) -> sp.csr_matrix:
-    """Mask (m, elements) of the elements that make each patch, of which it has at least `least` where the mesh has them."""
+def _patches(mesh: Any, seeds: sp.csr_matrix, sources: np.ndarray, mirrored: np.ndarray, least: float) -> sp.csr_matrix:
+    """Mask (m, elements) of the elements that make each patch.
+
+    With their mirror images beyond the planes of symmetry of `mirrored` (dim, nodes) they are at least `least` where the mesh
+    has them.
+    """
     count = mesh.t.shape[1]
     around = sp.csr_matrix(
         (np.ones(mesh.t.size), (mesh.t.ravel(), np.tile(np.arange(count), len(mesh.t)))), (mesh.p.shape[1], count)
     )
     patches = seeds @ around
-    small = np.isin(sources, mesh.boundary_nodes()) | (np.diff(patches.indptr) < least)
+    rim = mesh.facets[:, mesh.boundary_facets()]
+    rim = np.unique(rim[:, ~np.any(np.all(mirrored[:, rim], axis=1), axis=0)])
+    images = 2.0 ** np.where(sources >= 0, mirrored[:, sources].sum(axis=0), 0)
+    small = np.isin(sources, rim) | (images * np.diff(patches.indptr) < least)
     for _ in range(3):
         if not small.any():
             break
         wider = patches[small] @ around.T @ around
         patches = _replaced(patches, small, wider)
-        small = np.diff(patches.indptr) < min(least, count)
+        small = images * np.diff(patches.indptr) < min(least, count)
     return patches
 
 

@@ -159,8 +159,8 @@ def show(options: argparse.Namespace) -> int:
 
 
 def simplify(options: argparse.Namespace) -> int:
-    from contactopt.analysis.simplest import simplify
     from contactopt.runner import scene_of
+    from contactopt.simplification import simplify
 
     print(simplify(scene_of(options.scene, **_arguments_of(options.set)), solve=not options.no_solve))
     return 0

@@ -85,7 +85,7 @@ def make_parser() -> argparse.ArgumentParser:
     simple.add_argument(
         "--no-solve",
         action="store_true",
-        help="look only for what makes no error; then the scene need not be solved",
+        help="look only for symmetries, without the proof that takes a solution",
     )
     new = add("new", "write an example of a scene file, to start from", commands.new)
     new.add_argument(

@@ -108,7 +108,7 @@ def natural_map_residual(
     d = np.asarray(problem.Q @ r.ravel() if moved is None else moved.value).reshape(r.shape)
     w = problem.q + (problem.V @ lam).reshape(r.shape)
     u = d + w
-    measure = _yardsticks(problem, r, d, w)
+    measure = yardsticks(problem, r, d, w)
     errors = np.linalg.norm(r - problem.law.project(r - measure.rho[:, None] * u)[0], axis=1)
     r_n, r_t = split(r)
     beyond = np.linalg.norm(r_t, axis=1) - problem.law.bound(r_n)
@@ -121,10 +121,22 @@ def natural_map_residual(
     return worst if np.isfinite(worst) else np.inf
 
 
-def _yardsticks(problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.ndarray) -> Yardsticks:
-    """The force F, the length L and the steps rho of the certificate, as in the head of this module.
+def yardsticks(problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.ndarray) -> Yardsticks:
+    """Find the force F, the length L and the steps rho of the certificate, as in the head of this module.
 
-    r (k, dim) are the forces, d = Q r and w = q + V lambda; all finite.
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    r
+        (k, dim) forces [force].
+    d, w
+        (k, dim) displacements d = Q r and w = q + V lambda [length]; all finite.
+
+    Returns
+    -------
+    Yardsticks
+        What the errors are compared with.
     """
     size = np.linalg.norm(r, axis=1)
     largest = float(size.max())

@@ -346,7 +346,8 @@ def arch(
         def build(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
             from contactopt.scenes.polar import ring
 
-            rows = max(1, round(2 * elements * np.pi * radius / stones / thickness))
+            # An even number: the keystone has edges in the arch's plane of symmetry.
+            rows = 2 * max(1, round(elements * np.pi * radius / stones / thickness))
             angles = np.linspace(number * np.pi / stones, (number + 1) * np.pi / stones, rows + 1)
             return ring(np.linspace(radius - thickness / 2, radius + thickness / 2, 2 * elements + 1), angles)
 

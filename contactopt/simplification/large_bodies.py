@@ -1,9 +1,11 @@
 """Half-spaces instead of bodies that are large beside their contact.
 
-One coarse solve gives the half-width a of the contact, the total force, and the gap about it, which a polynomial of the distance
-continues. Two errors remain for the peak pressure, both measured on Hertz's contact (contactopt.analysis.simplest.constants): that of
-a body that ends at the distance L from the contact, FINITE (a / L)^2, and that of a surface that is not flat, STEEP times the square of
-its slope at the edge of the contact. The approach is not the same: it depends on the whole bodies.
+One coarse solve gives the half-width a of the contact, the total force, and the gap about it, which
+a polynomial of the distance continues. Two errors remain for the peak pressure, both measured on
+Hertz's contact (contactopt.simplification.constants): that of a body that ends at the distance L
+from the contact, FINITE (a / L)^2, and that of a surface that is not flat, STEEP times the square
+of its slope at the edge of the contact. The approach is not the same: it depends on the whole
+bodies.
 """
 
 from __future__ import annotations
@@ -14,18 +16,19 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.simplest.constants import ACROSS, FINITE, REACH, STEEP
-from contactopt.analysis.simplest.regions import region
 from contactopt.analysis.solve_scene import Solved
 from contactopt.analysis.status import contact_status
+from contactopt.bodies.elements import face_nodes
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
+from contactopt.simplification.constants import ACROSS, FINITE, REACH, STEEP, WORST
+from contactopt.simplification.findings import Found, Simplification
+from contactopt.simplification.whole import lattice_points, sizes_of
 
 FLAT = 0.95  # cosine between the contact normals inside the contact and their mean, at least
 RINGS = 2.0  # contact half-widths about the middle whose gaps the polynomial follows
 FEWEST = 4  # contacts inside the contact for its shape to be known
 ROUGH = 0.02  # of the indentation: how well the polynomial must follow the gap
 SMALL = 1e-6  # tangential force over the normal one that counts as none
-ALL = 64  # sides of each size among which the nearest one is looked for
 AROUND = 0.5  # cosine to the normal of the contact from which on a side belongs to the surface about it
 
 
@@ -33,7 +36,8 @@ AROUND = 0.5  # cosine to the normal of the contact from which on a side belongs
 class Spot:
     """The contact as a coarse solve shows it.
 
-    half_width  of the contact [length];   force  total normal force;  shear  total tangential forces (dim - 1,) on the upper body, along the tangents
+    half_width  of the contact [length];   force  total normal force
+    shear       total tangential forces (dim - 1,) on the upper body, along the tangents
     gap         the initial gap as a function of the distance from the middle (in 2D the place along the line)
     size        distance from the contact to the nearest end of an elastic body [length]
     slope       of the gap at the edge of the contact [-];   misfit  of the gap over the indentation [-]
@@ -53,6 +57,28 @@ class Spot:
         return FINITE * (self.half_width / self.size) ** 2 + STEEP * self.slope**2 + self.misfit
 
 
+def offered_half_spaces(scene: Scene, solved: Solved) -> Found:
+    """Half-spaces for the bodies of a scene, as a solution on a coarse mesh shows the contact."""
+    if scene.kind == "axisymmetric":  # a section costs less than the square of points of a half-space
+        return [], []
+    spot = spot_of(solved)
+    if isinstance(spot, str):
+        return [], [f"Half-spaces are no model of this scene: {spot}."] if len(scene.pairs) == 1 else []
+    size = f"{spot.size / spot.half_width:.3g} half-widths from the contact"
+    if spot.error > WORST:
+        error = f"{spot.error:.0%} in the peak pressure: the bodies end {size}"
+        return [], [f"Half-spaces would make an error of about {error}."]
+    made = as_half_spaces(scene, spot)
+    why = (
+        f"The bodies end no nearer than {size}, and the gap rises by at most {spot.slope:.2g} per length "
+        "inside it. The error is that of the peak pressure and the half-width; the approach is another "
+        "one, because it depends on the whole bodies."
+    )
+    what = "Half-spaces without a mesh stand for the bodies; their frame is the contact's own."
+    sizes = sizes_of(scene), sizes_of(made)
+    return [Simplification("half-spaces", what, why, *sizes, made, error=spot.error)], []
+
+
 def spot_of(solved: Solved) -> Spot | str:
     """The contact of a solved scene, or half a sentence that says why it is none of half-spaces."""
     scene, problem = solved.reduction.scene, solved.reduction.problem
@@ -68,96 +94,67 @@ def spot_of(solved: Solved) -> Spot | str:
         return "the mesh is too coarse to show the shape of the contact"
     if touching.all() or problem.chart.closed:
         return "the contact fills all of its surface, so that its edge is that of a body"
-    frames = solved.reduction.frames
-    mean = problem.areas @ frames[:, 0]
-    mean = mean / np.linalg.norm(mean)
-    if np.any(frames[touching, 0] @ mean < FLAT):
+    mean = problem.areas @ solved.reduction.frames[:, 0]
+    if np.any(solved.reduction.frames[touching, 0] @ mean < FLAT * np.linalg.norm(mean)):
         return "the surfaces turn by too much inside the contact"
-    return _spot(solved, touching, mean)
-
-
-def _spot(solved: Solved, touching: np.ndarray, mean: np.ndarray) -> Spot | str:
-    reduction, problem, r = solved.reduction, solved.reduction.problem, solved.solution.reactions
     places, number = problem.chart.images()
-    weight = r[number, 0] / np.maximum(problem.areas[number], 1e-300)
-    share = problem.areas[number] * weight
-    middle = places @ share / share.sum()
+    middle = places @ r[number, 0] / r[number, 0].sum()
     distance = np.linalg.norm(places - middle[:, None], axis=0)
     half_width = float(distance[touching[number]].max())
     if not 0 < half_width < 0.95 * distance.max():
         return "the contact reaches to the end of its surface"
-    fitted = _gap(distance, reduction.gap[number], half_width)
+    fitted = _gap(distance, solved.reduction.gap[number], half_width)
     if isinstance(fitted, str):
         return fitted
     gap, slope, misfit = fitted
-    size = _size(solved, touching)
-    force = float(r[:, 0].sum())
     shear = np.where(problem.chart.mirrored, 0.0, r[:, 1:].sum(axis=0))  # that of mirror images cancels
-    return Spot(half_width, force, shear, gap, size, slope, misfit)
+    return Spot(half_width, float(r[:, 0].sum()), shear, gap, _size(solved, touching), slope, misfit)
 
 
 def _gap(
     distance: np.ndarray, gap: np.ndarray, a: float
 ) -> tuple[Callable[[np.ndarray], np.ndarray], float, float] | str:
-    """An even polynomial of fourth degree through the gap within RINGS half-widths, its slope at the edge, its misfit."""
+    """An even polynomial through the gap about a contact, its slope at the edge, its misfit."""
     near = distance <= RINGS * a
     s = distance[near] / a
-    terms = np.stack([np.ones_like(s), s**2, s**4], axis=1)
     if len(np.unique(np.round(s, 6))) < 5:
         return "the mesh is too coarse to show the gap about the contact"
-    c, *_ = np.linalg.lstsq(terms, gap[near], rcond=None)
+    terms = np.stack([np.ones_like(s), s**2, s**4], axis=1)
+    c = np.linalg.lstsq(terms, gap[near], rcond=None)[0]
     if c[1] <= 0:
         return "the gap does not grow from the middle of the contact"
-    indentation = float(c[1] + c[2])
-    misfit = float(np.abs(terms @ c - gap[near]).max() / max(2 * indentation, 1e-300))
+    misfit = float(np.abs(terms @ c - gap[near]).max() / max(2 * (c[1] + c[2]), 1e-300))
     if misfit > ROUGH:
         return "the gap about the contact is no smooth function of the distance from its middle"
-
-    def function(d: np.ndarray) -> np.ndarray:
-        return np.asarray(c[1] * (d / a) ** 2 + c[2] * (d / a) ** 4)
-
-    return function, float(2 * c[1] + 4 * c[2]) / a, misfit
+    slope = float(2 * c[1] + 4 * c[2]) / a
+    return lambda d: np.asarray(c[1] * (d / a) ** 2 + c[2] * (d / a) ** 4), slope, misfit
 
 
 def _size(solved: Solved, touching: np.ndarray) -> float:
-    """Distance from the contact to the nearest side of an elastic body that does not go on from its surface [length]."""
-    reduction = solved.reduction
+    """Distance from the contact to the nearest side that does not go on from its surface."""
+    reduction, scene, least = solved.reduction, solved.reduction.scene, np.inf
     centre = reduction.problem.coordinates[:, touching].mean(axis=1, keepdims=True)
-    least = np.inf
-    planes = [plane for made in reduction.couplings for plane in made.planes]
-    scene = reduction.scene
-    for part in (part for part in scene.parts if isinstance(part, Part)):
-        mesh = part.build_mesh(scene.elements, scene.zone)
+    for part, made in zip(scene.parts, reduction.bodies):
+        if not isinstance(part, Part):
+            continue
+        basis, degree = made.body.basis, made.body.degree  # type: ignore[attr-defined]
+        mesh = basis.mesh
         surface = np.concatenate([mesh.boundaries[name] for name in scene.surfaces_of(part)])
         facets = np.setdiff1d(mesh.boundary_facets(), surface)
-        middles = mesh.p[:, mesh.facets[:, facets]].mean(axis=1)
-        around = np.sum(outward(mesh, facets) * outward(mesh, surface).mean(axis=1)[:, None], axis=0) > AROUND
-        for plane in planes:
-            around |= plane.contains(middles, float(np.ptp(mesh.p, axis=1).max()))
+        corners = mesh.p[:, mesh.facets[:, facets]]
+        outward, up = (face_nodes(basis, degree, own)[1] for own in (facets, surface))
+        around = up.mean(axis=1) @ outward > AROUND
+        for plane in (plane for coupling in reduction.couplings for plane in coupling.planes):
+            around |= plane.contains(corners.mean(axis=1), float(np.ptp(mesh.p, axis=1).max()))
         if not around.all():
-            apart, _ = region(mesh, facets[~around]).distance(centre, ALL)
-            least = min(least, float(apart[0]))
-    return float(least)
-
-
-def _part(scene: Scene, name: str) -> Any:
-    return next(part for part in scene.parts if part.name == name)
-
-
-def outward(mesh: Any, facets: np.ndarray) -> np.ndarray:
-    """Outward unit normals (dim, m) of boundary facets."""
-    corners = mesh.p[:, mesh.facets[:, facets]]
-    edges = corners[:, 1:] - corners[:, :1]
-    across = np.stack([edges[1, 0], -edges[0, 0]]) if len(corners) == 2 else np.cross(edges[:, 0], edges[:, 1], axis=0)
-    inside = mesh.p[:, mesh.t[:, mesh.f2t[0, facets]]].mean(axis=1)
-    sense = np.sign(np.sum(across * (corners.mean(axis=1) - inside), axis=0))
-    return np.asarray(across * sense / np.linalg.norm(across, axis=0))
+            points = lattice_points(corners[:, :, ~around])
+            least = min(least, float(np.linalg.norm(points - centre, axis=0).min()))
+    return least
 
 
 def as_half_spaces(scene: Scene, spot: Spot) -> Scene:
-    """The contact between half-spaces, with the same materials, friction and total force, in axes of its own."""
+    """The contact between half-spaces of the same materials, in axes of its own."""
     dim = 2 if scene.kind == "plane-strain" else 3
-    components = ("x", "y", "z")
     reach = REACH * spot.half_width
 
     def points(elements: int, zone: float | None) -> tuple[np.ndarray, ...]:
@@ -169,16 +166,16 @@ def as_half_spaces(scene: Scene, spot: Spot) -> Scene:
         return spot.gap(np.linalg.norm(x[: dim - 1], axis=0))
 
     pair = scene.pairs[0]
-    upper, lower = (_part(scene, name) for name in pair.bodies)
-    total = {components[dim - 1]: -spot.force}
+    upper, lower = (next(part for part in scene.parts if part.name == name) for name in pair.bodies)
+    total = {"xyz"[dim - 1]: -spot.force}
     if np.linalg.norm(spot.shear) > SMALL * spot.force:
-        total |= {name: -float(value) for name, value in zip(components, spot.shear)}
+        total |= {name: -float(value) for name, value in zip("xyz", spot.shear)}
     top: Any = Rigid(upper.name, gap=gap, force=total)
     bottom: Any = Rigid(lower.name, gap=gap)
     if isinstance(lower, Part):
         bottom = HalfSpace(lower.name, lower.material, points)
-    if isinstance(upper, Part):
-        height = (lambda x: -gap(x)) if isinstance(lower, Part) else None  # a rigid body has the gap itself
+    if isinstance(upper, Part):  # a rigid body below has the gap itself
+        height = (lambda x: -gap(x)) if isinstance(lower, Part) else None
         top = HalfSpace(upper.name, upper.material, points, height=height, force=total)
     return Scene(
         f"{scene.name} as half-spaces",

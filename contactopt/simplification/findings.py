@@ -9,6 +9,8 @@ from contactopt.analysis.solve_scene import Solved
 from contactopt.cards import card, count, line
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
+from contactopt.simplification.constants import PROVED
+from contactopt.simplification.proof import Fold
 
 PARTS = {2: "half", 4: "quarter", 8: "eighth"}
 ROUNDING = 1e-10  # a smaller change between two solutions is rounding
@@ -18,13 +20,14 @@ ROUNDING = 1e-10  # a smaller change between two solutions is rounding
 class Simplification:
     """Something that may be left out of a scene.
 
-    name      'plane strain', 'axisymmetry', 'mirror symmetry', 'half-spaces', 'tied contacts' or 'frictionless contacts'
+    name      'plane strain', 'mirror symmetry', 'half-spaces', 'tied contacts' or 'frictionless contacts'
     what      one sentence that says what is left out
     why       one or two sentences that say why, and how the error is known
-    exact     whether the smaller scene has the answer of the whole one; only what the meshes differ in remains then
-    error     relative error that it makes, None where it is not known: where the mesh is cut, or has to be made anew
     before, after   (unknowns, contacts that are not tied) of the scene that it is applied to, and of the simplified one, counted from their meshes
-    scene     the simplified scene; None where the mesh has to be made anew by hand
+    scene     the simplified scene
+    folds     how the scene that it is applied to lies on the simplified one, where both have the same answer; else empty
+    proof     certificate of the whole with what the simplified scene says of it; None where it was not computed
+    error     relative error of a simplification that is not exact
     check     function of the solved simplified scene that says in a sentence whether what was assumed holds; None where
               nothing was assumed
     """
@@ -32,24 +35,28 @@ class Simplification:
     name: str
     what: str
     why: str
-    exact: bool
-    error: float | None
     before: tuple[int, int]
-    after: tuple[int, int] | None = None
-    scene: Scene | None = field(default=None, repr=False)
+    after: tuple[int, int]
+    scene: Scene = field(repr=False)
+    folds: tuple[Fold, ...] = field(default=(), repr=False)
+    proof: float | None = None
+    error: float = 0.0
     check: Callable[[Solved], str] | None = field(default=None, repr=False)
+
+    @property
+    def exact(self) -> bool:
+        """Whether the certificate of the whole proves that its answer is that of the whole."""
+        return self.proof is not None and self.proof <= PROVED
 
     @property
     def price(self) -> str:
         """What it leaves, and what the error is, in words."""
         if self.exact:
-            error = "no error" if self.error == 0 else "no error but that of the mesh"
-        elif self.error is None:
-            error = "error not known"
+            error = f"no error: the certificate of the whole is {self.proof:.0e}"
+        elif self.folds:
+            error = "no error, but not proved"
         else:
             error = f"error about {self.error:.1e}" if self.error > ROUNDING else "no error on the coarse mesh"
-        if self.after is None:
-            return error
         (n, k), (m, c) = self.before, self.after
         return f"{n} -> {count(m, 'unknown')}, {k} -> {count(c, 'contact')}, {error}"
 
@@ -62,7 +69,8 @@ class Simplified:
     """What simplify() found.
 
     given    the scene that was asked about
-    scene    the scene after all exact simplifications, one after the other; the given one if there are none
+    scene    the scene after all simplifications that are exact, one after the other; the given one if there are none. Where no
+             proof was asked for, these are the simplifications that await it
     found    the simplifications; the exact ones come first, and each begins with the scene that the one before leaves. The
              others begin with `scene`
     notes    sentences about what nearly was a simplification, and what spoils it
@@ -84,13 +92,13 @@ class Simplified:
     @property
     def needs(self) -> str:
         """One sentence: what is enough for this scene."""
-        exact = [each for each in self.found if each.exact and each.scene is not None]
-        if not exact:
+        used = [each for each in self.found if each.folds]
+        if not used:
             return f"Scene '{self.given.name}' needs all of its model: nothing can be left out exactly."
-        unknowns, contacts = exact[-1].after or exact[-1].before
-        first = exact[0].before
+        (unknowns, contacts), first = used[-1].after, used[0].before
+        doubt = "" if used[-1].exact else ", if the proof holds, which takes its solution"
         return (
-            f"Scene '{self.given.name}' needs no more than {_model(self.given, self.scene)}: "
+            f"Scene '{self.given.name}' needs no more than {_model(self.given, self.scene)}{doubt}: "
             f"{count(unknowns, 'unknown')} instead of {first[0]}, {count(contacts, 'contact')} instead of {first[1]}."
         )
 
@@ -98,8 +106,6 @@ class Simplified:
         lines = [self.needs]
         for each in self.found:
             lines += ["", f"{each.name}: {each.what}", f"  {each.why}", f"  {each.price}"]
-            if each.scene is None:
-                lines[-1] += "; make this mesh anew to apply it"
         return "\n".join([*lines, *(["", *self.notes] if self.notes else [])])
 
     def __repr__(self) -> str:
@@ -116,7 +122,9 @@ class Simplified:
 def _model(given: Scene, scene: Scene) -> str:
     """'one quarter of the bodies', 'one half of a section in plane strain'."""
     whole = "what is modelled" if given.copies > 1 else "the bodies"
-    if scene.kind != given.kind:
-        whole = {"plane-strain": "a section in plane strain"}.get(scene.kind, "an axisymmetric section")
+    whole = whole if scene.kind == given.kind else "a section in plane strain"
     part = PARTS.get(scene.copies // given.copies)
     return f"one {part} of {whole}" if part else whole
+
+
+Found = tuple[list[Simplification], list[str]]  # what was found, and sentences about what spoils it

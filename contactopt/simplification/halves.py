@@ -1,0 +1,168 @@
+"""One half of a scene that is its own mirror image across a plane normal to an axis.
+
+`Scene.copies` doubles, so that forces, reactions and areas stay those of the whole. What the plane
+cuts keeps the half on the positive side and is held there along the normal. Of two bodies, contacts
+or plates that are each other's images the one on the positive side stays, and stands for both: its
+forces are those of both together. No element is cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from contactopt.bodies.elements import is_curved, straight
+from contactopt.errors import InputError
+from contactopt.scenes.scene import Part, Plate, Rigid, Scene, Support
+from contactopt.simplification.constants import NEAR
+from contactopt.simplification.images import Images, Plane
+from contactopt.simplification.proof import Fold, Key
+from contactopt.simplification.whole import Whole, of_mesh, with_pairs
+
+
+def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
+    """The half on the positive side of a plane across an axis, and how the whole lies on it.
+
+    Raises InputError if the plane runs through elements.
+    """
+    scene, near = whole.scene, NEAR * whole.size
+    component = scene.components[int(np.argmax(np.abs(plane.normal)))]
+    heights = {name: float(np.mean(plane.height(mesh.p))) for name, mesh in whole.meshes.items()}
+    kept = {name for name, image in images.bodies.items() if name in heights and (image == name or heights[name] > 0)}
+    pairs = tuple(pair for pair in scene.pairs if _keeps(pair, whole, images, kept, plane))
+    rigid = {name for pair in pairs for name in pair.bodies if name in whole.rigid}
+    bodies: list[Any] = []
+    for part in scene.parts:
+        if isinstance(part, Part) and part.name in kept:
+            bodies.append(_half_part(whole, images, part, plane, component))
+        elif isinstance(part, Rigid) and part.name in rigid:
+            bodies.append(_half_rigid(images, part, component))
+    if scene.contacts or len(pairs) != 1 or len(bodies) != 2:
+        made = replace(scene, upper=None, lower=None, mu=None, law="coulomb", bodies=tuple(bodies), contacts=pairs)
+    else:
+        made = with_pairs(replace(scene, upper=bodies[0], lower=bodies[1]), pairs)
+    there = {("body", name) for name in kept | rigid} | {("pair", pair.name) for pair in pairs}
+    partner = {("body", name): ("body", image) for name, image in images.bodies.items()}
+    partner |= {("pair", name): ("pair", image) for name, image in images.pairs.items()}
+    turned_over = {("pair", name) for name in images.swapped}
+
+    def fold(key: Key, x: np.ndarray) -> tuple[Key, np.ndarray, np.ndarray]:
+        own = plane.height(x) >= -near if partner[key] == key else np.full(x.shape[1], key in there)
+        turns = np.where(own[:, None, None], np.eye(len(x)), plane.reflection)
+        sign = -1.0 if key not in there and key in turned_over else 1.0
+        return key if key in there else partner[key], np.where(own, x, plane.image(x)), sign * turns
+
+    return replace(made, copies=2 * scene.copies), fold
+
+
+def half_mesh(plane: Plane, cut: str) -> Callable[[Any], Any]:
+    """The function that takes the elements above a plane, with a boundary of that name in it."""
+
+    def change(mesh: Any) -> Any:
+        near = NEAR * float(np.ptp(mesh.p, axis=1).max())
+        height = plane.height(mesh.p)[mesh.t]
+        if np.any((height.min(axis=0) < -near) & (height.max(axis=0) > near)):
+            raise InputError("the plane of symmetry runs through elements; make meshes with edges in it.")
+        elements = np.flatnonzero(height.mean(axis=0) > 0)
+        own = _restricted(mesh, elements)
+        kept = {name: facets for name, facets in (own.boundaries or {}).items() if len(facets)}
+        inside = np.abs(plane.height(own.p)[own.facets]).max(axis=0) < near
+        flat = np.intersect1d(own.boundary_facets(), np.flatnonzero(inside))
+        return replace(own, _boundaries=None, _subdomains=None).with_boundaries(kept | {cut: flat})
+
+    return change
+
+
+def _restricted(mesh: Any, elements: np.ndarray) -> Any:
+    """The mesh of some elements; those of second order keep their curved sides."""
+    own = straight(mesh).restrict(elements)
+    if not is_curved(mesh):
+        return own
+    made = type(mesh).from_mesh(replace(own, _boundaries=None, _subdomains=None))
+    points = made.doflocs.copy()
+    points[:, made.dofs.element_dofs] = mesh.doflocs[:, mesh.dofs.element_dofs[:, elements]]
+    return replace(made, doflocs=points, _boundaries=own.boundaries)
+
+
+def roller(whole: Whole) -> str:
+    """A support that holds one component of contacts in a plane across it; empty if there is none.
+
+    In a scene of mirror images such a support is a plane of symmetry
+    (contactopt.interface.charts), in a whole scene it is not.
+    """
+    for name, part in whole.parts.items():
+        mesh = whole.meshes[name]
+        surfaces = [mesh.facets[:, mesh.boundaries[s]].ravel() for s in whole.scene.surfaces_of(part)]
+        for support in part.supports:
+            nodes = np.unique(mesh.facets[:, mesh.boundaries[support.boundary]])
+            for component in support.displacement or {}:
+                row = mesh.p[whole.scene.components.index(component), nodes]
+                if np.ptp(row) < NEAR * whole.size and len(np.intersect1d(nodes, np.concatenate(surfaces))):
+                    return f"the support on {support.boundary!r} of body '{name}'"
+    return ""
+
+
+def _keeps(pair: Any, whole: Whole, images: Images, kept: set[str], plane: Plane) -> bool:
+    """Whether a pair belongs to the half: of two that are images one stays, on the positive side."""
+    elastic = [name for name in pair.bodies if name in whole.meshes]
+    if any(name not in kept for name in elastic):
+        return False
+    if images.pairs[pair.name] == pair.name or any(images.bodies[name] != name for name in elastic):
+        return True  # cut by the plane, or the image is a pair of the body on the other side
+    corners = [whole.corners(pair.bodies[i], whole.surface_of(pair, i)) for i in (0, 1) if whole.surface_of(pair, i)]
+    farthest = max((float(plane.height(c).mean()) for c in corners), key=abs)
+    return farthest > 0 if abs(farthest) > NEAR * whole.size else bool(pair.name < images.pairs[pair.name])
+
+
+def _half_rigid(images: Images, part: Rigid, component: str) -> Rigid:
+    """Held along the normal if the plane cuts it, with both forces if it stands for two."""
+    if images.bodies[part.name] != part.name:
+        return replace(part, force=_doubled(part.force))
+    return replace(part, force=_without(part.force, component), displacement=_without(part.displacement, component))
+
+
+def _without(values: Any, component: str) -> Any:
+    return {name: value for name, value in values.items() if name != component} if values else values
+
+
+def _doubled(values: Any) -> Any:
+    return {name: 2 * value for name, value in values.items()} if values else values
+
+
+def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component: str) -> Part:
+    name, own = part.name, whole.meshes[part.name].boundaries or {}
+    if images.bodies[name] != name:
+        loads = [replace(load, force=_doubled(load.force)) if isinstance(load, Plate) else load for load in part.loads]
+        return replace(part, loads=tuple(loads))
+    cut = f"symmetry {component}"
+    while cut in own:
+        cut += "'"
+
+    def there(boundary: str) -> bool:
+        return bool(plane.height(whole.corners(name, boundary)).max() > NEAR * whole.size)
+
+    supports = [item for item in part.supports if there(item.boundary)] + [Support(cut, {component: 0.0})]
+    made: list[Any] = []
+    for number, load in enumerate(part.loads):
+        if not isinstance(load, Plate):
+            if not hasattr(load, "boundary") or there(load.boundary):
+                made.append(load)
+        elif (name, number) in images.own:
+            made.append(replace(load, force=_without(load.force, component)))
+            if component in load.force and not load.glued:
+                supports.append(Support(load.boundary, {component: 0.0}))
+        elif there(load.boundary):
+            made.append(replace(load, force=_doubled(load.force)))
+    surfaces = [surface for surface in whole.scene.surfaces_of(part) if there(surface)]
+    curves = {surface: part.curve_of(surface) for surface in surfaces}
+    return replace(
+        part,
+        mesh=of_mesh(part.mesh, half_mesh(plane, cut)),
+        supports=tuple(supports),
+        loads=tuple(made),
+        contact=part.contact if part.contact in surfaces else surfaces[0],
+        curve={surface: curve for surface, curve in curves.items() if curve is not None} or None,
+    )

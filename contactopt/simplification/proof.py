@@ -1,0 +1,170 @@
+"""The proof that the part of a scene answers for the whole: one certificate of the whole.
+
+The part is solved. Its displacements and its contact tractions are mirrored, turned or drawn out to
+all nodes and contacts of the whole, which is assembled on its own meshes, with its own loads, gaps
+and friction. What is computed then contains nothing of the part but these numbers:
+
+    equilibrium   |A U - f - B' r| on unknowns that are free and the total forces of plates and rigid bodies, over the largest
+                  force on a node or plate
+    supports      |U - g| on unknowns that are held, over the largest displacement of the body
+    contact       |r_i - P(r_i - rho_i u_i)| / F, the natural map at every contact, as in contactopt.problem.certificate
+
+This takes products with the stiffness of the whole and no solve. In space it costs much less than the
+part saves. In the plane, where assembling is most of the work, a part pays if it is solved more than
+once, as in a search for an accuracy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from contactopt.analysis.solve_scene import Solved
+from contactopt.bodies import assemble
+from contactopt.bodies.body import Assembly
+from contactopt.interface.coupling import Coupling, couple
+from contactopt.problem.certificate import Yardsticks, yardsticks
+from contactopt.problem.laws import make_law
+from contactopt.scenes.contact import Contact
+from contactopt.scenes.scene import Rigid, Scene
+from contactopt.simplification.constants import NEAR
+
+Key = tuple[str, str]  # ("body", its name) or ("pair", its name)
+# ("body" or "pair", name), points (dim, k) of the larger scene -> the same of the smaller one, and matrices (k, dim, dim')
+# that take vectors there back to vectors here
+Fold = Callable[[Key, np.ndarray], tuple[Key, np.ndarray, np.ndarray]]
+
+
+def certificate_of_whole(whole: Scene, elements: int, zone: float | None, part: Solved, folds: Sequence[Fold]) -> float:
+    """How far the whole is from solved by what the part's solution says of it.
+
+    Parameters
+    ----------
+    whole
+        The scene that the part stands for, of elastic and rigid bodies.
+    elements, zone
+        The numbers for which the meshes of both were made.
+    part
+        The part, solved.
+    folds
+        How the whole lies on the part, one step after the other.
+
+    Returns
+    -------
+    The largest of the errors in the head of this module [-]; infinite where nodes or contacts of the
+    whole have no place in the part.
+    """
+    bodies: dict[str, Any] = {each.name: assemble(whole, each, elements, zone) for each in whole.parts}
+    spread = Spread(part, folds)
+    errors = [0.0]
+    try:
+        moves = {each.name: spread.displacement(each, bodies[each.name]) for each in whole.parts}
+        forces = {name: np.zeros(len(U)) for name, U in moves.items()}
+        for pair in whole.pairs:
+            upper, lower = pair.bodies
+            made = couple(whole, pair, bodies[upper], bodies[lower])
+            r, measure = spread.reactions(pair, made)
+            u = (made.upper @ moves[upper] - made.lower @ moves[lower]).reshape(r.shape)
+            u[:, 0] += made.gap
+            law = make_law(pair.law, pair.mu, made.areas, made.positions)
+            off = r - law.project(r - measure.rho[:, None] * u)[0]
+            errors.append(float(np.linalg.norm(off, axis=1).max(initial=0.0)) / measure.force)
+            forces[upper] += made.upper.T @ r.ravel()
+            forces[lower] -= made.lower.T @ r.ravel()
+    except LookupError:
+        return np.inf
+    for each in whole.parts:
+        U, F = moves[each.name], forces[each.name]
+        rigid = isinstance(each, Rigid)
+        errors.append(_rigid(whole, each, U, F) if rigid else _elastic(bodies[each.name].body, U, F))
+    return max(errors) if np.all(np.isfinite(errors)) else np.inf
+
+
+class Spread:
+    """The solution of a part at the places of the whole; LookupError where the part has none."""
+
+    def __init__(self, part: Solved, folds: Sequence[Fold]):
+        self.part, self.folds = part, folds
+        reduction, solution = part.reduction, part.solution
+        self.displaced = {body.name: U for body, U in zip(reduction.bodies, reduction.displaced(solution))}
+        self.bodies: dict[str, Any] = {body.name: body for body in reduction.bodies}
+        u = reduction.problem.displacements(solution.reactions, solution.multipliers)
+        d = np.asarray(reduction.problem.Q @ solution.reactions.ravel()).reshape(u.shape)
+        self.measure = yardsticks(reduction.problem, solution.reactions, d, u - d)
+
+    def folded(self, key: Key, x: np.ndarray) -> tuple[Key, np.ndarray, np.ndarray]:
+        """Where places of the whole lie in the part, and the matrices (k, dim, dim') for vectors."""
+        turns = np.tile(np.eye(len(x)), (x.shape[1], 1, 1))
+        for fold in self.folds:
+            key, x, more = fold(key, x)
+            turns = turns @ more
+        return key, x, turns
+
+    def displacement(self, each: Any, body: Any) -> np.ndarray:
+        """U (n,) of a body of the whole; of a rigid one its translation, and zeros for its forces."""
+        if isinstance(each, Rigid):
+            dim = len(body.components)
+            key, _, turns = self.folded(("body", each.name), np.zeros((dim, 1)))
+            U = self.displaced[key[1]]
+            return np.concatenate([turns[0] @ U[: len(U) // 2], np.zeros(dim)])
+        made: Assembly = body.body
+        key, x, turns = self.folded(("body", each.name), made.locations)
+        own: Assembly = self.bodies[key[1]].body
+        there = self.displaced[key[1]][own.unknowns][:, _nearest(own.locations, x)]
+        U = np.zeros(len(made.load))
+        U[made.unknowns] = np.einsum("kab,bk->ak", turns, there)
+        return U
+
+    def reactions(self, pair: Contact, made: Coupling) -> tuple[np.ndarray, Yardsticks]:
+        """r (k, dim) of a pair of the whole, and the yardsticks for its natural map."""
+        key, x, turns = self.folded(("pair", pair.name), made.positions)
+        pairs = self.part.reduction.problem.pairs
+        number = next(i for i, own in enumerate(pairs) if own.name == key[1])
+        there, own = self.part.reduction.couplings[number], pairs[number].contacts
+        contacts = _nearest(there.positions, x)
+        force = np.einsum("kac,ka->kc", there.frames, self.part.solution.reactions[own])[contacts]
+        # A contact of the part stands for several of the whole, or for a slice of one.
+        share = made.areas / np.where(there.areas > 0, there.areas, np.inf)[contacts]
+        r = np.einsum("kca,kab,kb->kc", made.frames, turns, force) * share[:, None]
+        largest = float(share.max(initial=0.0)) or 1.0
+        rho = self.measure.rho[own][contacts] * largest
+        return r, Yardsticks(self.measure.force * largest, 0.0, rho)
+
+
+def _nearest(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """The number of the point at each wanted place; LookupError if one of them has none."""
+    distance, number = KDTree(points.T).query(wanted.T)
+    if distance.max(initial=0.0) > 10 * NEAR * float(np.ptp(points, axis=1).max(initial=0.0)):
+        raise LookupError
+    return np.asarray(number)
+
+
+def _elastic(body: Assembly, U: np.ndarray, force: np.ndarray) -> float:
+    """How far an elastic body is from equilibrium, and from what its supports ask for."""
+    inner = body.A @ U
+    missing = inner - body.load - force
+    plates = body.motion.T @ missing - body.plate_forces
+    scale = max(float(np.abs(each).max(initial=0.0)) for each in (inner, body.load, force, body.plate_forces))
+    driven = body.motion / np.maximum(body.motion.sum(axis=0), 1.0)
+    beyond = U - body.prescribed
+    beyond = beyond - body.motion @ (driven.T @ beyond)
+    beyond[body.free] = 0.0
+    left = np.abs(np.concatenate([missing[body.free], plates])).max(initial=0.0)
+    size = float(np.abs(U).max(initial=0.0))
+    return float(max(left / max(scale, 1e-300), np.abs(beyond).max(initial=0.0) / max(size, 1e-300)))
+
+
+def _rigid(whole: Scene, body: Any, U: np.ndarray, force: np.ndarray) -> float:
+    """How far a rigid body is from the balance of its forces, and from where it is held."""
+    errors = [0.0]
+    for number, name in enumerate(whole.components):
+        if name in (body.force or {}):
+            asked, wrong, own = body.force[name], force[number] + body.force[name], force[: whole.dim]
+        else:
+            asked = (body.displacement or {}).get(name, 0.0)
+            wrong, own = U[number] - asked, U[: whole.dim]
+        errors.append(abs(wrong) / max(float(np.abs(own).max()), abs(asked), 1e-300))
+    return float(max(errors))

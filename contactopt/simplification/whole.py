@@ -1,0 +1,137 @@
+"""A scene with the meshes of its bodies: how large it is, and where its gaps and its friction act."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import skfem
+
+from contactopt.bodies.body import check_mesh
+from contactopt.bodies.elements import SHAPES
+from contactopt.scenes.contact import Contact
+from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
+from contactopt.simplification.constants import BETWEEN
+
+
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """A scene of elastic and rigid bodies, and one mesh of each elastic one."""
+
+    scene: Scene
+    meshes: dict[str, Any]
+
+    @cached_property
+    def parts(self) -> dict[str, Part]:
+        """The elastic bodies by their names."""
+        return {part.name: part for part in self.scene.parts if isinstance(part, Part)}
+
+    @cached_property
+    def rigid(self) -> dict[str, Rigid]:
+        """The rigid bodies by their names."""
+        return {part.name: part for part in self.scene.parts if isinstance(part, Rigid)}
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """(dim, n) the nodes of all bodies [length]."""
+        return np.concatenate([mesh.doflocs for mesh in self.meshes.values()], axis=1)
+
+    @property
+    def size(self) -> float:
+        """Largest extent [length]."""
+        return float(np.ptp(self.points, axis=1).max())
+
+    def corners(self, body: str, boundary: str) -> np.ndarray:
+        """(dim, corners, m) of the facets of a boundary [length]."""
+        mesh = self.meshes[body]
+        return np.asarray(mesh.p[:, mesh.facets[:, mesh.boundaries[boundary]]])
+
+    def surface_of(self, pair: Contact, side: int) -> str:
+        """The name of the boundary of a side of a pair; empty for a rigid body."""
+        part = self.parts.get(pair.bodies[side])
+        return "" if part is None else pair.surfaces[side] or part.contact
+
+    def surfaces(self, pair: Contact) -> list[tuple[str, str]]:
+        """(body, boundary) of the elastic sides of a pair."""
+        named = [(pair.bodies[side], self.surface_of(pair, side)) for side in (0, 1)]
+        return [(body, boundary) for body, boundary in named if boundary]
+
+    def acting(self, body: str, boundary: str) -> np.ndarray:
+        """(dim, s) nodes of a boundary and points between them, on its curve as well."""
+        if (body, boundary) not in self._acting:
+            corners, curve = self.corners(body, boundary), self.parts[body].curve_of(boundary)
+            x = lattice_points(corners)
+            on = x if curve is None else np.concatenate([x, np.asarray(curve(x), dtype=float)], axis=1)
+            self._acting[body, boundary] = on
+        return self._acting[body, boundary]
+
+    @cached_property
+    def _acting(self) -> dict[tuple[str, str], np.ndarray]:
+        return {}
+
+
+def lattice_points(corners: np.ndarray) -> np.ndarray:
+    """(dim, s) evenly spaced points of facets with corners (dim, n, m), which are among them."""
+    t = np.linspace(0.0, 1.0, BETWEEN + 1)
+    a, b = (grid.ravel() for grid in np.meshgrid(t, t))
+    inside = a + b <= 1 + 1e-12
+    weights = {
+        2: np.stack([1 - t, t]),
+        3: np.stack([1 - a - b, a, b])[:, inside],
+        4: np.stack([(1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b]),
+    }[corners.shape[1]]
+    return np.asarray(np.einsum("dcm,cs->dsm", corners, weights).reshape(len(corners), -1))
+
+
+def whole_of(scene: Scene) -> Whole | None:
+    """The scene with its meshes; None where a body is a half-space or lives elsewhere."""
+    if not all(isinstance(part, (Part, Rigid)) for part in scene.parts):
+        return None
+    parts = [part for part in scene.parts if isinstance(part, Part)]
+    meshes = {part.name: part.build_mesh(scene.elements, scene.zone) for part in parts}
+    for part in parts:
+        check_mesh(scene, part, meshes[part.name])
+    return Whole(scene, meshes)
+
+
+def sizes_of(scene: Scene) -> tuple[int, int]:
+    """Displacement unknowns and contacts that are not tied, counted from the meshes alone.
+
+    Contacts are the nodes of the finer surface of each pair; supports are not taken off.
+    """
+    unknowns, nodes = 0, {}
+    for part in scene.parts:
+        if isinstance(part, Part):
+            mesh = part.build_mesh(scene.elements, scene.zone)
+            numbers = skfem.Dofs(mesh, SHAPES[mesh.refdom.__name__][1][scene.degree]())
+            unknowns += scene.dim * int(numbers.N)
+            for name in scene.surfaces_of(part):
+                nodes[part.name, name] = len(numbers.get_facet_dofs(mesh.boundaries[name]).flatten())
+        elif isinstance(part, HalfSpace):
+            grid = [len(row) for row in part.ticks(scene.elements, scene.zone, scene.dim - 1)]
+            unknowns += scene.dim * int(np.prod(grid))
+            nodes[part.name, "contact"] = int(np.prod(grid))
+    usual = {part.name: getattr(part, "contact", "contact") for part in scene.parts}
+    counts = [
+        max(nodes.get((body, name or usual[body]), 0) for body, name in zip(pair.bodies, pair.surfaces))
+        for pair in scene.pairs
+        if pair.law != "tied"
+    ]
+    return unknowns, sum(counts)
+
+
+def with_pairs(scene: Scene, pairs: tuple[Contact, ...]) -> Scene:
+    """The scene with other pairs of surfaces, in its short form if it has one and they fit."""
+    if scene.contacts or len(pairs) != 1:
+        return replace(scene, upper=None, lower=None, mu=None, law="coulomb", bodies=scene.parts, contacts=pairs)
+    return replace(scene, mu=pairs[0].mu, law=pairs[0].law)
+
+
+def of_mesh(mesh: Any, change: Callable[[Any], Any]) -> Any:
+    """A changed mesh, or the function that makes it where the mesh is a function."""
+    if callable(mesh):
+        return lambda elements, zone: change(mesh(elements, zone))
+    return change(mesh)
