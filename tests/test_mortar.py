@@ -13,7 +13,7 @@ from contactopt import Contact, InputError, Plate, Support, reduce, reduce_bodie
 from contactopt.bodies.elements import FACES, weight_at
 from contactopt.interface.faces import Faces, cross, evaluate
 from contactopt.interface.mortar import mortar
-from contactopt.interface.segments import neighbours
+from contactopt.interface.search import Facets, facing_pairs
 from contactopt.scenes import round as round_bodies
 from contactopt.scenes.common import with_elements
 from contactopt.scenes.meshes import rename, tensor_mesh
