@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass, replace
+from tempfile import TemporaryDirectory
 from typing import Any
 
+import gmsh
 import numpy as np
 import skfem
 from scipy.spatial.transform import Rotation
 from skfem.quadrature import get_quadrature
 
+from contactopt import BodyForce, Material, Part, Scene, Support, load_mesh, reduce_bodies, solve
+from contactopt.analytic import Reference, contact_modulus, hertz_line, hertz_point, pin_in_hole
 from contactopt.bodies.elements import FACES
 from contactopt.interface.faces import Faces, cross, faces_of
 from contactopt.interface.mortar import mortar
 from experiments.report import write
 
 PAIRS = 1000
+SHAPES, MESHES = ("roller", "ball", "pin"), 30
+FACETS = (8.0, 20.0)  # on the half-width of contact, on either side
+CLEARANCE = 1e-3  # of the pin, over its radius
 GAPS = (1e-4, 1e3)  # over the mean size of the facets
 ELEMENTS = {  # kind of the body's elements -> those of its surface
     "RefTri": (skfem.ElementLineP1(), skfem.ElementLineP2()),
@@ -128,3 +135,143 @@ def pairs(count: int) -> list[dict[str, Any]]:
             worst = {key: max((row[key] for row in own), default=0.0) for key in ("area", "uniform pressure")}
             made.append({"space": f"{dim}D", "surfaces": kind, "pairs": len(own)} | worst)
     return made
+
+
+def meshed(rng: np.random.Generator, build: Any, side: Any, sizes: tuple[float, float, float], order: int) -> Any:
+    """A mesh by one of Gmsh's methods, of elements of the first size up to the distance of the third, then growing up to
+    the second; `side` (x, y) names the boundaries."""
+    fine, coarse, reach = sizes
+    options = {"General.Terminal": 0, "Mesh.RandomSeed": rng.uniform(0.5, 2), "Mesh.Algorithm": rng.choice([1, 5, 6, 8])}
+    options |= {"Mesh.RecombineAll": rng.integers(2), "Mesh.ElementOrder": order}
+    gmsh.initialize(interruptible=False)
+    try:
+        for key, value in (options | {"Mesh.MeshSizeExtendFromBoundary": 0, "Mesh.MeshSizeFromPoints": 0}).items():
+            gmsh.option.setNumber(key, float(value))
+        body = build(gmsh.model.occ)
+        gmsh.model.occ.synchronize()
+        grow, field = rng.uniform(0.15, 0.35), gmsh.model.mesh.field
+        number = field.add("MathEval")
+        away = f"(Sqrt(x^2 + y^2) - {reach})"
+        field.setString(number, "F", f"Min({coarse}, {fine} + {grow} * ({away} + Abs({away})) / 2)")
+        field.setAsBackgroundMesh(number)
+        gmsh.model.addPhysicalGroup(2, [tag for _, tag in body], name="body")
+        sides: dict[str, list[int]] = {}
+        for _, line in gmsh.model.getBoundary(body, oriented=False):
+            x, y, _ = gmsh.model.occ.getCenterOfMass(1, line)
+            sides.setdefault("axis" if abs(x) < 1e-6 * reach else side(x, y), []).append(line)
+        for name, lines in sides.items():
+            gmsh.model.addPhysicalGroup(1, lines, name=name)
+        gmsh.model.mesh.generate(2)
+        with TemporaryDirectory() as folder:
+            gmsh.write(f"{folder}/body.msh")
+            return load_mesh(f"{folder}/body.msh")
+    finally:
+        gmsh.finalize()
+
+
+def half_disc(occ: Any, y: float, radius: float) -> list[tuple[int, int]]:
+    right = [(2, occ.addRectangle(0, y - 2 * radius, 0, 2 * radius, 4 * radius))]
+    return list(occ.intersect([(2, occ.addDisk(0, y, 0, radius, radius))], right)[0])
+
+
+def circle(y: float, radius: float) -> Any:
+    """The function that puts points on a circle."""
+    middle = np.array([[0.0], [y]])
+    return lambda x: middle + radius * (x - middle) / np.linalg.norm(x - middle, axis=0)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A round body of radius R, above (up = 1) or below another one, and what is exact."""
+
+    shape: str
+    radius: float
+    up: float
+    force: float
+    exact: Reference
+    materials: tuple[Material, Material]
+
+
+def case(shape: str, rng: np.random.Generator) -> Case:
+    """A roller or a ball with a contact of a few percent of its radius, or a pin that fills up to a third of its hole."""
+    radius, steel = 10 ** rng.uniform(-1, 2), Material(210e3, 0.3)
+    soft = steel if shape == "pin" else Material(steel.E * 10 ** rng.uniform(-0.5, 0.5), 0.3)
+    modulus, a = contact_modulus(steel, soft), radius * rng.uniform(0.02, 0.05)
+    if shape == "pin":
+        force = modulus * CLEARANCE * radius * 10 ** rng.uniform(-1, 0.3)
+        exact = pin_in_hole(force, radius, CLEARANCE * radius, modulus)
+    elif shape == "roller":
+        force = np.pi * a**2 * modulus / (4 * radius)
+        exact = hertz_line(force, radius, modulus)
+    else:
+        force = 4 * a**3 * modulus / (3 * radius)
+        exact = hertz_point(force, radius, modulus)
+    return Case(shape, radius, float(rng.choice([-1, 1])), force, exact, (steel, soft))
+
+
+def scene(one: Case, rng: np.random.Generator) -> tuple[Scene, dict[str, Any]]:
+    """Half of both bodies, meshed apart from each other."""
+    R, up, pin, a = one.radius, one.up, one.shape == "pin", one.exact.half_width
+    order, degree = (int(rng.integers(1, 3)) for _ in range(2))
+    fine = a / rng.uniform(*FACETS, 2)
+    r, wide = (R * (1 - CLEARANCE), 30 * R) if pin else (R, 4 * R)
+
+    def plate(occ: Any) -> Any:
+        if pin:
+            return occ.cut(half_disc(occ, up * R, wide), [(2, occ.addDisk(0, up * R, 0, R, R))])[0]
+        return [(2, occ.addRectangle(0, -wide if up > 0 else 0, 0, wide, wide))]
+
+    def side(x: float, y: float) -> str:
+        if pin:
+            return "contact" if np.hypot(x, y - up * R) < 2 * R else "far"
+        return "contact" if abs(y) < 1e-6 * R else "side" if abs(x - wide) < 1e-6 * R else "far"
+
+    disc = meshed(rng, lambda occ: half_disc(occ, up * r, r), lambda x, y: "contact", (fine[0], r / 5, 1.3 * a), order)
+    base = meshed(rng, plate, side, (fine[1], wide / 5, 1.3 * a), order)
+    volume = np.pi**2 / 2 * r**2
+    volume = 4 / 3 * np.pi * r**3 if one.shape == "ball" else np.pi * r**2 / 2
+    across = "r" if one.shape == "ball" else "x"
+    along = "z" if one.shape == "ball" else "y"
+    share = 1.0 if one.shape == "ball" else 0.5
+    hold = Support("axis", {across: 0.0})
+    push = BodyForce((0.0, -up * share * one.force / volume))
+    bodies = (
+        Part("disc", disc, one.materials[0], (hold,), (push,), "contact", circle(up * r, r)),
+        Part("base", base, one.materials[1], (hold, Support("far")), (), "contact", circle(up * R, R) if pin else None),
+    )
+    kind = "axisymmetric" if one.shape == "ball" else "plane-strain"
+    made = Scene(one.shape, *(bodies if up > 0 else bodies[::-1]), 0.0, kind=kind, degree=degree, law="frictionless")
+    return made, {"order": order, "degree": degree, "facets": f"{a / fine[0]:.0f}, {a / fine[1]:.0f}"}
+
+
+def read(x: np.ndarray, p: np.ndarray, areas: np.ndarray) -> tuple[float, float]:
+    """Peak and half-width where p^2 is a polynomial of third degree in x^2, fitted where the pressure is not small."""
+    inside = (p > 0.15 * p.max()) & (areas > 0)
+    A = np.vander((x[inside] / x[inside].max()) ** 2, 4, increasing=True)
+    root = np.sqrt(areas[inside])
+    c = np.linalg.lstsq(A * root[:, None], p[inside] ** 2 * root, rcond=None)[0]
+    roots = np.roots(c[::-1])
+    ends = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.8)].real
+    return float(np.sqrt(c[0])), float(np.sqrt(ends.min(initial=np.inf)) * x[inside].max())
+
+
+def mesh(shape: str, seed: int) -> dict[str, Any]:
+    """Errors of the peak and of the half-width on two meshes that know nothing of each other."""
+    rng = np.random.default_rng([seed, *shape.encode()])
+    one = case(shape, rng)
+    made, row = scene(one, rng)
+    reduction = reduce_bodies(made)
+    problem, solution = reduction.problem, solve(reduction.problem)
+    place = reduction.coupling.positions
+    x = one.radius * np.arctan2(place[0], one.up * one.radius - place[1] * 1) if shape == "pin" else place[0]
+    if shape == "pin":
+        x = one.radius * np.arctan2(place[0], one.radius - one.up * place[1])
+    area = problem.areas
+    p = np.divide(solution.reactions[:, 0], area, out=np.zeros_like(area), where=area > 0)
+    row = {"shape": shape, "seed": seed, "carrier": reduction.coupling.carrier} | row
+    row |= {"status": solution.status.label, "contacts": problem.contacts}
+    peak, width = read(x, p, area)
+    known = read(x, np.nan_to_num(one.exact.pressure(x)), area)
+    row["peak at a node"] = float(p.max()) / one.exact.peak - 1
+    row |= {"peak": peak / one.exact.peak - 1, "half-width": width / one.exact.half_width - 1}
+    return row | {"reading": max(abs(known[0] / one.exact.peak - 1), abs(known[1] / one.exact.half_width - 1))}
