@@ -31,6 +31,7 @@ from contactopt.interface.faces import Faces, cross, face_normals, patches
 from contactopt.interface.search import Facets, facing_pairs
 
 SMALLEST = 1e-8  # cells that are covered by less than this fraction count as uncovered: the noise of coordinates
+WHOLE = 1e-9  # and those that are covered but for less than this count as covered
 FACING = -0.1  # the cosine between normals of faces that face each other is below this
 FOLD = 1.05  # a cell that is covered by more than this faces two layers of the other surface
 # degrees added to the quadrature where a face is distorted, so that integrands are no polynomials: on flat interfaces, where
@@ -48,6 +49,7 @@ class Overlap:
     there   (dim - 1, g) reference coordinates on it
     axes    (g, dim - 1, dim) directions across which both places coincide: the line between them is normal to these
     measure (g,) area that every point stands for, with the weight of the integrals
+    window  (2, dim - 1, own cells) begin and width, from 0 to 1, of the smallest similar cell around the covered part
     """
 
     cell: np.ndarray
@@ -56,6 +58,7 @@ class Overlap:
     there: np.ndarray
     axes: np.ndarray
     measure: np.ndarray
+    window: np.ndarray
 
 
 def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
@@ -215,6 +218,7 @@ def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     keep = _nearest(other, mine, theirs, seen, len(own.faces) * len(own.cells))
     covered = np.bincount(mine.cell[first[keep]], length[keep], len(own.faces) * len(own.cells))
     keep = np.flatnonzero(keep & (covered[mine.cell[first]] > SMALLEST))
+    window = _windows(own, mine.cell[first[keep]], s[:, None, keep].transpose(1, 2, 0), covered)
     points, share = get_quadrature(RefLine, 8 + CURVED * (own.curved or other.curved))
     local = s[0, keep, None] + length[keep, None] * points[0]
     m = len(share)
@@ -226,7 +230,7 @@ def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     there = other.locate(theirs.face[second[pair]], x, axes, np.array([[0.5]]))
     measure = (share * length[keep, None]).ravel() * np.abs(width[0, pair]) * np.linalg.norm(tangents[:, 0], axis=0)
     measure *= weight_at(own.weight, x)
-    return Overlap(mine.cell[first[pair]], here, theirs.face[second[pair]], there, axes, measure)
+    return Overlap(mine.cell[first[pair]], here, theirs.face[second[pair]], there, axes, measure, window)
 
 
 def _project(
@@ -255,6 +259,24 @@ def _project(
         if done:
             break
     return s
+
+
+def _windows(own: Faces, cell: np.ndarray, corners: np.ndarray, covered: np.ndarray) -> np.ndarray:
+    """Begin and width (2, dim - 1, cells) of the smallest similar cell around the corners (dim - 1, q, v) of pieces on cells
+    (q,); all of a cell where it is covered as a whole."""
+    window = np.stack([np.zeros((own.dim - 1, len(covered))), np.ones((own.dim - 1, len(covered)))])
+    low, high = np.ones(window[0].shape), np.zeros(window[0].shape)
+    for d, x in enumerate(corners):
+        np.minimum.at(low[d], cell, x.min(axis=1))
+        np.maximum.at(high[d], cell, x.max(axis=1))
+    if own.corners == 3:  # from the corner up to the parallel of the third side
+        far = np.zeros(len(covered))
+        np.maximum.at(far, cell, corners.sum(axis=0).max(axis=1))
+        high = low + far - low.sum(axis=0)
+    partial = (covered > SMALLEST) & (covered < 1 - WHOLE)
+    low, high = low.clip(0.0, 1.0), high.clip(0.0, 1.0)
+    window[:, :, partial] = np.stack([low, high - low])[:, :, partial]
+    return window
 
 
 def _check_fold(other: Faces, mine: _Polygons, covered: np.ndarray) -> None:
@@ -292,6 +314,14 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     keep = _nearest(other, mine, theirs, _Pieces(first, second, part, middle, outward[:, first]), len(full))
     covered = np.bincount(mine.cell[first[keep]], part[keep], len(full))
     keep &= covered[mine.cell[first]] > SMALLEST
+    # the corners of pieces on cells that are covered in part only, in the coordinates of the cells
+    part_of = np.flatnonzero(keep & (covered[mine.cell[first]] < 1 - WHOLE))
+    v = polygon.shape[1]
+    mine_at = np.repeat(first[part_of], v)
+    x = origin[:, mine_at] + np.einsum("gad,ga->dg", axes[mine_at], polygon[part_of].reshape(-1, 2))
+    here = own.locate(mine.face[mine_at], x, axes[mine_at], mine.at[:, mine_at].mean(axis=2))
+    corners = own.local(mine.cell[mine_at] % len(own.cells), here).reshape(2, -1, v)
+    window = _windows(own, mine.cell[first[part_of]], corners, covered)
     piece, fan = np.nonzero(keep[:, None] & (content > 1e-15 * np.abs(area)[first, None]))
     triangles, content = triangles[piece, fan], content[piece, fan]
     points, share = get_quadrature(RefTri, _order(own, other))
@@ -307,7 +337,7 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     place, tangents = own.locations(mine.face[mine_at], here)
     seen = np.abs(np.linalg.det(np.einsum("gad,dcg->gac", E, tangents)))
     measure = content * np.linalg.norm(cross(tangents), axis=0) / seen * weight_at(own.weight, place)
-    return Overlap(mine.cell[mine_at], here, theirs.face[theirs_at], there, E, measure)
+    return Overlap(mine.cell[mine_at], here, theirs.face[theirs_at], there, E, measure, window)
 
 
 def _order(own: Faces, other: Faces) -> int:
