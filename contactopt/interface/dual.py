@@ -20,7 +20,7 @@ from contactopt.interface.segments import Overlap
 SLIVER = (
     1e-11  # directions in which G extends less than the square root of this, over the cell: fields are constant there
 )
-WEAK = 0.125  # contacts with less than this share of their area pass it on to a neighbour: half of that of an end
+WEAK = 0.2  # contacts with less than this share of their area pass it on to a neighbour
 BLOCK = 200_000  # points of integration at a time
 
 

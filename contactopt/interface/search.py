@@ -112,7 +112,12 @@ def _tree(facets: Facets) -> tuple[list[Facets], np.ndarray]:
 
 
 def _clusters(
-    facets: Facets, centre: np.ndarray, start: np.ndarray, cluster: np.ndarray, used: np.ndarray, count: int
+    facets: Facets,
+    centre: np.ndarray,
+    start: np.ndarray,
+    cluster: np.ndarray,
+    used: np.ndarray,
+    count: int,
 ) -> Facets:
     """The balls and cones of clusters of facets in their order, placed at the numbers `used` among `count`."""
 
