@@ -12,8 +12,8 @@ from skfem.quadrature import get_quadrature
 
 from contactopt import Contact, InputError, Material, Plate, Support, reduce, reduce_bodies, scenes, solve
 from contactopt.bodies.elements import FACES, weight_at
-from contactopt.interface.faces import Faces, cross, evaluate
 from contactopt.interface import segments
+from contactopt.interface.faces import Faces, cross, evaluate
 from contactopt.interface.mortar import mortar
 from contactopt.interface.search import Facets, facing_pairs
 from contactopt.scenes import round as round_bodies

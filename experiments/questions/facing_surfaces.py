@@ -248,7 +248,6 @@ def scene(one: Case, rng: np.random.Generator) -> tuple[Scene, dict[str, Any]]:
     base = meshed(rng, plate, side, (fine[1], wide / 5, 1.3 * a), order)
     volume = 4 / 3 * np.pi * r**3 if one.shape == "ball" else np.pi * r**2 / 2
     across = "r" if one.shape == "ball" else "x"
-    along = "z" if one.shape == "ball" else "y"
     share = 1.0 if one.shape == "ball" else 0.5
     hold = Support("axis", {across: 0.0})
     push = BodyForce((0.0, -up * share * one.force / volume))
