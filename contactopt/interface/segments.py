@@ -127,58 +127,48 @@ def _facing(mine: _Polygons, theirs: _Polygons, spread: np.ndarray) -> tuple[np.
     return first[facing], second[facing]
 
 
-@dataclass(frozen=True, eq=False)
-class _Pieces:
-    """q pieces of own polygons that face other ones.
+def _nearest(
+    other: Faces,
+    mine: _Polygons,
+    theirs: _Polygons,
+    pairs: tuple[np.ndarray, np.ndarray],
+    content: np.ndarray,
+    middle: np.ndarray,
+    direction: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mask (q,) of the pieces on that layer of the other surface which the own one faces, and how much of each own cell
+    they cover.
 
-    first, second  (q,) own and other polygon of each
-    content        (q,) its part of the own cell
-    middle         (dim, q) a place within it on the own polygon [length]
-    direction      (dim, q) in which it is seen
+    `pairs` are the own and the other polygon of each piece, `content` (q,) is its part of the own
+    cell, `middle` (dim, q) a place within it, and `direction` (dim, q) the normal there.
+
+    A line along the normal may meet the other surface more than once, and goes on behind the own
+    one as well. Behind it counts what overlaps no deeper than about twice the distance of the
+    nearest place of the other surface. Where a cell is covered more than once, layers count that
+    are no further away than twice the nearest one. If these still cover the cell more than once,
+    the surface is folded: an InputError.
     """
-
-    first: np.ndarray
-    second: np.ndarray
-    content: np.ndarray
-    middle: np.ndarray
-    direction: np.ndarray
-
-
-def _nearest(other: Faces, mine: _Polygons, theirs: _Polygons, pieces: _Pieces, cells: int) -> np.ndarray:
-    """Mask (q,) of the pieces that lie on the layer of the other surface which the own one faces.
-
-    A line along the normal may meet the other surface more than once, and goes on behind the own one as well. Behind it
-    counts what overlaps no deeper than about twice the distance of the nearest place of the other surface. Where a cell
-    is covered more than once, layers count that are no further away than twice the nearest one. If they still cover the
-    cell more than once, the surface is folded.
-
-    Raises
-    ------
-    InputError
-        If the other surface is folded.
-    """
-    m = theirs.normal[:, pieces.second]
-    height = np.sum((theirs.centre[:, pieces.second] - pieces.middle) * m, axis=0)
-    height /= np.sum(pieces.direction * m, axis=0)
-    size = mine.radius[pieces.first] + theirs.radius[pieces.second]
-    keep = pieces.content > 0
+    first, second = pairs
+    m, cell = theirs.normal[:, second], mine.cell[first]
+    height = np.sum((theirs.centre[:, second] - middle) * m, axis=0) / np.sum(direction * m, axis=0)
+    size = mine.radius[first] + theirs.radius[second]
+    keep = content > 0
     deep = np.flatnonzero(keep & (height < -size))
     if len(deep):
-        nearest = KDTree(theirs.centre.T).query(mine.centre[:, pieces.first[deep]].T)[0]
+        nearest = KDTree(theirs.centre.T).query(mine.centre[:, first[deep]].T)[0]
         keep[deep] = -height[deep] <= 2 * nearest + size[deep]
-    cell = mine.cell[pieces.first]
-    covered = np.bincount(cell[keep], pieces.content[keep], cells)
+    cells = mine.cell.max() + 1
+    covered = np.bincount(cell[keep], content[keep], cells)
     several = np.flatnonzero(keep & (covered[cell] > FOLD))
     if len(several):
-        layer = _layers(other, cell[several], theirs.face[pieces.second[several]])
-        height, cell, size = np.abs(height[several]), cell[several], size[several]
+        layer, away = _layers(other, cell[several], theirs.face[second[several]]), np.abs(height[several])
         least, nearest = np.full(layer.max() + 1, np.inf), np.full(cells, np.inf)
-        np.minimum.at(least, layer, height)
-        np.minimum.at(nearest, cell, height)
-        keep[several] = least[layer] <= 2 * nearest[cell] + size
-        covered = np.bincount(mine.cell[pieces.first[keep]], pieces.content[keep], cells)
+        np.minimum.at(least, layer, away)
+        np.minimum.at(nearest, cell[several], away)
+        keep[several] = least[layer] <= 2 * nearest[cell[several]] + size[several]
+        covered = np.bincount(cell[keep], content[keep], cells)
         _check_fold(other, mine, covered)
-    return keep
+    return keep & (covered[cell] > SMALLEST), covered
 
 
 def _layers(other: Faces, cell: np.ndarray, face: np.ndarray) -> np.ndarray:
@@ -214,10 +204,9 @@ def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     length, middle = s[1] - s[0], s.mean(axis=0)
     direction = n0 + turn * middle
     direction /= np.linalg.norm(direction, axis=0)
-    seen = _Pieces(first, second, length, own.locations(face, start + width * middle)[0], direction)
-    keep = _nearest(other, mine, theirs, seen, len(own.faces) * len(own.cells))
-    covered = np.bincount(mine.cell[first[keep]], length[keep], len(own.faces) * len(own.cells))
-    keep = np.flatnonzero(keep & (covered[mine.cell[first]] > SMALLEST))
+    x = own.locations(face, start + width * middle)[0]
+    keep, covered = _nearest(other, mine, theirs, (first, second), length, x, direction)
+    keep = np.flatnonzero(keep)
     window = _windows(own, mine.cell[first[keep]], s[:, None, keep].transpose(1, 2, 0), covered)
     points, share = get_quadrature(RefLine, 8 + CURVED * (own.curved or other.curved))
     local = s[0, keep, None] + length[keep, None] * points[0]
@@ -311,9 +300,7 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     full = np.bincount(mine.cell, np.abs(area), len(own.faces) * len(own.cells))
     part = content.sum(axis=1) / full[mine.cell[first]]
     middle = origin[:, first] + np.einsum("pad,pa->dp", axes[first], polygon.mean(axis=1))
-    keep = _nearest(other, mine, theirs, _Pieces(first, second, part, middle, outward[:, first]), len(full))
-    covered = np.bincount(mine.cell[first[keep]], part[keep], len(full))
-    keep &= covered[mine.cell[first]] > SMALLEST
+    keep, covered = _nearest(other, mine, theirs, (first, second), part, middle, outward[:, first])
     # the corners of pieces on cells that are covered in part only, in the coordinates of the cells
     part_of = np.flatnonzero(keep & (covered[mine.cell[first]] < 1 - WHOLE))
     v = polygon.shape[1]
