@@ -16,11 +16,11 @@ COVERED = 0.99  # a contact with less than this share of its faces lies where th
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
-    """One sentence for every pair of surfaces whose zone of contact is smaller than the mesh can show, or reaches its rim.
+    """Tell of zones of contact that are smaller than the mesh can show, or reach the other surface's rim.
 
     A zone that ends by itself and has fewer contacts than a disc or strip of FEWEST elements across its half-width is told.
-    A surface that touches as a whole has no such zone. Contacts at the rim of the other surface are told, since a part of
-    their faces bears the force.
+    A surface that touches as a whole has no such zone. Contacts at the
+    rim of the other surface are told, since only a part of their faces bears the force.
 
     Parameters
     ----------
@@ -45,8 +45,9 @@ def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
             least = np.argmin(np.where(rim, coupling.share, 1.0))
             where = ", ".join(f"{c:.4g}" for c in coupling.positions[:, least])
             found.append(
-                f"{rim.sum()} contacts of '{name}' touch at the rim of the other surface, which covers part of their faces "
-                f"only, as little as {coupling.share[least]:.0%} near ({where}): their pressure is the force over that part."
+                f"{rim.sum()} contacts of '{name}' touch at the rim of the other surface, which covers "
+                f"only a part of their faces, as little as {coupling.share[least]:.0%} near ({where}): "
+                "their pressure is the force over that part."
             )
         images = 2 ** int(np.sum(problem.chart.mirrored))
         strip = 2 * FEWEST if problem.dim == 2 else np.pi * FEWEST**2

@@ -1,9 +1,11 @@
 """Integrals of dual functions over the overlap of two surfaces: areas and weights of the contacts.
 
 The mathematics is in contactopt.interface.mortar. On the covered part G of a cell, the functional int psi_v f / a_v is the
-value at vertex v of the best linear fit of f. Where G is a part of the cell only, hat functions and vertices are those of the
-smallest similar cell around G (Overlap.window), so that fields are nowhere continued beyond G. The functional is computed as the mean of f plus the slopes of the fit, from hat functions
-less their means on G: the condition of the system then does not depend on where G lies in the cell, but on its shape alone.
+value at vertex v of the best linear fit of f. Where G is a part of the cell only, hat functions and
+vertices are those of the smallest similar cell around G (Overlap.window), so that fields are
+nowhere continued beyond G. The functional is computed as the mean of f plus the slopes of the fit,
+from hat functions less their means on G: the condition of the system then does not depend on where
+G lies in the cell, but on its shape alone.
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ class Integrals:
 
     nodes    (k,) nodes of the own side
     areas    (k,) integrals of the hat functions over the covered part, with the weight of the integrals
-    partial  (k,) whether a cell is covered in part only: there the contact lies where its weights put it, not at its node
+    partial  (k,) whether a cell is covered in part only: there the contact lies where its weights
+             put it, not at its node
     own      (k, nodes of the own body) and
     other    (k, nodes of the other body): weights W and W' with unit row sums
     apart    (dim, k) weighted vector from the other true surface to the own one [length]
@@ -146,9 +149,9 @@ def integrate(own: Faces, other: Faces, points: Overlap, full: np.ndarray) -> In
 
 
 def _pass_on(rows: np.ndarray, area: np.ndarray, full: np.ndarray) -> np.ndarray:
-    """Contacts (cell, v) at the vertices of cells, where those that are hardly covered give way to the strongest there.
+    """Contacts (cell, v) at the vertices of cells; those hardly covered give way to the strongest.
 
-    The pressure that the edge of the other surface exerts would be divided by an area that may be as small as you like.
+    The force of the other surface's edge would be divided by an area as small as you like.
     """
     share = np.bincount(rows.ravel(), area.ravel(), len(full)) / full
     weak = (share < WEAK)[rows]

@@ -98,7 +98,7 @@ class Faces:
         return evaluate(_SHAPES[self.kind][1][self.degree], at)[0]
 
     def local(self, cell: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Coordinates (dim - 1, m) on linear cells (m,), from 0 to 1, of reference coordinates (dim - 1, m) of the face."""
+        """Coordinates (dim - 1, m) on linear cells (m,), 0 to 1, of places `at` on the face."""
         first, last = self.places[:, self.cells[:, 0]], self.places[:, self.cells[:, [1, -1]]].max(axis=2)
         return np.asarray((at - first[:, cell]) / np.where(last > first, last - first, 1.0)[:, cell])
 

@@ -137,12 +137,14 @@ def _turn(surface: Surface) -> np.ndarray:
 def _along(
     upper: Surface, lower: Surface, direction: np.ndarray, slack: np.ndarray, spacing: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The partner (k,) of every lower contact along a direction (dim, k), its distance from that line and what is allowed.
+    """The partner (k,) of every lower contact along a direction (dim, k), its distance from that
+    line, and what is allowed.
 
-    Each search starts at the nearest contact of the upper surface and moves along the line to the height of the contact
-    found, until it finds the same one again. Contacts that face the same way as the lower one, on the far side of a pin in
-    a bush, do not count. Where the search ends further off than is allowed, all contacts of the upper surface are
-    compared, up to the first ones that have no partner among them either: then the surfaces do not match.
+    Each search starts at the nearest contact of the upper surface and moves along the line to the
+    height of the contact found, until it finds the same one again. Contacts that face the same way
+    as the lower one, on the far side of a pin in a bush, do not count. Where the search ends further
+    off than is allowed, all contacts of the upper surface are compared, up to the first ones that
+    have no partner among them either: then the surfaces do not match.
     """
     count = lower.points.shape[1]
     tree, height = KDTree(upper.points.T), np.zeros(count)

@@ -16,11 +16,11 @@ is the value at contact i of its best linear fit on the covered part. Hence:
 * Rows of W and of W' add up to one, so that forces are equal and opposite.
 * The psi_i add up to one, so that a uniform pressure, r_i = p a_i, gives every node of both sides exactly the integral of
   its shape function: the patch test. It holds on partly covered faces too.
-* A cell that is partly covered is cut down to the smallest similar cell around G, with hat functions of its own: a
-  contact outside the other surface moves to its edge, where the force acts. Continued to the node, the normals and the gap
-  of a steep side beyond the edge mean nothing. Contacts without any covered cell are left out, and those that are
-  hardly covered (WEAK) pass their share on to the strongest contact of the same cell, since the force of an edge over
-  the area of a sliver is no pressure either.
+* A cell that is partly covered is cut down to the smallest similar cell around G, with hat
+  functions of its own: a contact outside the other surface moves to its edge, where the force acts.
+  Continued to the node, the normals and the gap of a steep side mean nothing. Contacts without any
+  covered cell are left out. Those that are hardly covered (WEAK) pass their share on to the
+  strongest contact of the cell: the force of an edge over the area of a sliver is no pressure.
 
 **Moments.** Forces act at W x and W' x'. The vector e_i = W_ij x_j - W'_ij x'_j between these places is zero where the
 surfaces lie on each other, but not where both are polygons inscribed in one curve; the moment of interface forces is the
@@ -89,8 +89,8 @@ class Mortar:
     areas    (k,) areas of the covered parts, with the weight of the integrals
     normals  (dim, k) unit normals, outward from the lower body
     gap      (k,) initial gap [length]
-    points   (dim, k) positions: of the nodes, or of the edge of the other surface where it ends before the node
-    share    (k,) the areas over those of the contacts' faces: less than one where the other surface ends
+    points   (dim, k) positions: of the nodes, or of the other surface's edge if it ends before
+    share    (k,) the areas over those of the faces: less than one where the other surface ends
     weights  two (k, nodes of the body): what the displacement of the nodes contributes to that of the contacts
     alone    two (k, nodes of the body): the displacement at the contact's own node, and at the place facing it
     lever    (dim, k) l_i, from the other body to the own one [length]; zero where the surfaces lie on each other
@@ -212,8 +212,8 @@ def _contacts(surface: Faces, faces: np.ndarray) -> int:
 
 
 def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compute the outward normals at contact nodes from the linear fits on all cells around them, the sizes of these
-    cells, and the integrals of the hat functions over them.
+    """Compute the outward normals at contact nodes from the linear fits on all cells around them,
+    the sizes of these cells, and the integrals of the hat functions over them.
 
     Parameters
     ----------
@@ -223,8 +223,8 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     Returns
     -------
     tuple
-        Unit normals (dim, n), sizes (n,) [length] and integrals (n,), which count with the surface's weight. All are zero
-        at points that are no contact nodes.
+        Unit normals (dim, n), sizes (n,) [length] and integrals (n,), with the surface's weight.
+        All are zero at points that are no contact nodes.
     """
     n, count = surface.points.shape[1], len(surface.faces)
     total, area, full = np.zeros(surface.points.shape), np.zeros(n), np.zeros(n)

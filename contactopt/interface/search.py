@@ -1,17 +1,19 @@
-"""Which facets of two surfaces may face each other: the pairs that a straight line along a normal of the first one meets.
+"""Which facets of two surfaces may face each other: the pairs that a line along a normal of the first meets.
 
-An own facet sees along a cone of directions: its normals. Both surfaces are halved again and again into clusters of
-near facets. A cluster is enclosed in a ball, and its directions in a cone. Pairs of clusters that no line joins are
-left out with all facets in them. What remains lies in the tubes over the own facets, however long these are, so that
-cost and memory grow with the number of pairs that do face each other and not with the gap.
+An own facet sees along a cone of directions: its normals. Both surfaces are halved again and again
+into clusters of near facets. A cluster is enclosed in a ball, and its directions in a cone. Pairs
+of clusters that no line joins are left out with all facets in them. What remains lies in the tubes
+over the own facets, however long these are. So cost and memory grow with the number of pairs that
+do face each other, and not with the gap.
 
-**No pair is missed.** Let a line from the point p of a facet, along its normal n, meet another facet at q = p + t n. Let
-these facets lie in the balls of their clusters, with centres a and b, and let R be the sum of the radii. Then v = b - a
-differs from t n by at most R. So either |v| <= R, or v is off the line of n by an angle of at most arcsin(R / |v|), and
-off the axis of the cluster's cone by at most this angle and the half-angle of the cone. Both conditions are tested.
+**No pair is missed.** Let a line from the point p of a facet, along its normal n, meet another
+facet at q = p + t n. Let these facets lie in the balls of their clusters, with centres a and b, and
+let R be the sum of the radii. Then v = b - a differs from t n by at most R. So either |v| <= R, or
+v is off the line of n by an angle of at most arcsin(R / |v|), and off the axis of the cluster's
+cone by at most this angle and the half-angle of the cone. Both conditions are tested.
 
-Source of halving both sets at once: Gottschalk, Lin, Manocha (1996), OBBTree: a hierarchical structure for rapid
-interference detection, Proc. SIGGRAPH 96, 171-180.
+Source of halving both sets at once: Gottschalk, Lin, Manocha (1996), OBBTree: a hierarchical
+structure for rapid interference detection, Proc. SIGGRAPH 96, 171-180.
 """
 
 from __future__ import annotations
@@ -44,7 +46,7 @@ class Facets:
 
 
 def facing_pairs(own: Facets, other: Facets, facing: float) -> tuple[np.ndarray, np.ndarray]:
-    """Find all pairs of facets of which the first one may see the second one along its normals, on either side.
+    """Find all pairs of facets of which the first may see the second along its normals, on either side.
 
     Parameters
     ----------
@@ -77,7 +79,7 @@ def facing_pairs(own: Facets, other: Facets, facing: float) -> tuple[np.ndarray,
 
 
 def _seen(own: Facets, other: Facets, facing: float) -> np.ndarray:
-    """Whether (n,) some line along a direction of each own cluster may meet the other cluster of the same number."""
+    """Whether (n,) some line along a direction of each own cluster may meet its partner."""
     v, reach = other.centre - own.centre, own.radius + other.radius
     along = np.sum(v * own.axis, axis=0)
     distance = np.linalg.norm(v, axis=0)
@@ -89,10 +91,10 @@ def _seen(own: Facets, other: Facets, facing: float) -> np.ndarray:
 
 
 def _tree(facets: Facets) -> tuple[list[Facets], np.ndarray]:
-    """Clusters of every level, from one to as many as there are facets, and the facet of each of the last ones.
+    """Clusters of every level, from one to as many as there are facets, and the facets of the last.
 
-    Cluster c of a level is halved, across its longest side, into 2 c and 2 c + 1 of the next one. Some of the last level
-    are empty: their radius is not a number, so that they are never seen.
+    Cluster c of a level is halved, across its longest side, into 2 c and 2 c + 1 of the next one.
+    Some of the last level are empty: their radius is not a number, so that they are never seen.
     """
     n = len(facets.radius)
     order, levels = np.arange(n), []
@@ -119,7 +121,7 @@ def _clusters(
     used: np.ndarray,
     count: int,
 ) -> Facets:
-    """The balls and cones of clusters of facets in their order, placed at the numbers `used` among `count`."""
+    """Balls and cones of clusters of facets in their order, at the numbers `used` among `count`."""
 
     def placed(values: np.ndarray) -> np.ndarray:
         full = np.full((*values.shape[:-1], count), np.nan)

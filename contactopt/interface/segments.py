@@ -49,7 +49,8 @@ class Overlap:
     there   (dim - 1, g) reference coordinates on it
     axes    (g, dim - 1, dim) directions across which both places coincide: the line between them is normal to these
     measure (g,) area that every point stands for, with the weight of the integrals
-    window  (2, dim - 1, own cells) begin and width, from 0 to 1, of the smallest similar cell around the covered part
+    window  (2, dim - 1, own cells) begin and width, from 0 to 1, of the smallest similar cell around
+            the covered part
     """
 
     cell: np.ndarray
@@ -116,7 +117,7 @@ def _cut(surface: Faces, own: bool) -> _Polygons:
 
 
 def _facing(mine: _Polygons, theirs: _Polygons, spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of polygons that may face each other; the own ones see within angles `spread` (p,) of their normals."""
+    """Pairs of polygons that may face each other; own ones see within `spread` (p,) of their normals."""
     none = np.zeros(0, dtype=int)
     if not len(mine.face) or not len(theirs.face):
         return none, none
@@ -136,8 +137,8 @@ def _nearest(
     middle: np.ndarray,
     direction: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mask (q,) of the pieces on that layer of the other surface which the own one faces, and how much of each own cell
-    they cover.
+    """Mask (q,) of the pieces on that layer of the other surface which the own one faces, and how
+    much of each own cell they cover.
 
     `pairs` are the own and the other polygon of each piece, `content` (q,) is its part of the own
     cell, `middle` (dim, q) a place within it, and `direction` (dim, q) the normal there.
@@ -172,7 +173,7 @@ def _nearest(
 
 
 def _layers(other: Faces, cell: np.ndarray, face: np.ndarray) -> np.ndarray:
-    """Numbers (q,) of the layers that faces (q,) seen from cells (q,) belong to: faces of a layer hang together there."""
+    """Numbers (q,) of the layers of faces (q,) seen from cells (q,): those of a layer hang together."""
     nodes = other.faces[face, : other.corners]
     known, hub = np.unique(cell[:, None] * other.points.shape[1] + nodes, return_inverse=True)
     q = len(face)
@@ -251,8 +252,8 @@ def _project(
 
 
 def _windows(own: Faces, cell: np.ndarray, corners: np.ndarray, covered: np.ndarray) -> np.ndarray:
-    """Begin and width (2, dim - 1, cells) of the smallest similar cell around the corners (dim - 1, q, v) of pieces on cells
-    (q,); all of a cell where it is covered as a whole."""
+    """Begin and width (2, dim - 1, cells) of the smallest similar cell around the corners
+    (dim - 1, q, v) of pieces on cells (q,); all of a cell where it is covered as a whole."""
     window = np.stack([np.zeros((own.dim - 1, len(covered))), np.ones((own.dim - 1, len(covered)))])
     low, high = np.ones(window[0].shape), np.zeros(window[0].shape)
     for d, x in enumerate(corners):
