@@ -11,6 +11,7 @@ from mortar_scenes import couple, press_fit, resultants, ring, slab
 from skfem.quadrature import get_quadrature
 
 from contactopt import Contact, InputError, Material, Plate, Support, reduce, reduce_bodies, scenes, solve
+from contactopt.analysis.resolution import remarks
 from contactopt.bodies.elements import FACES, weight_at
 from contactopt.interface import segments
 from contactopt.interface.faces import Faces, cross, evaluate
@@ -371,6 +372,26 @@ def test_a_layer_far_behind_the_nearest_one_is_none_of_a_fold(gap):
     assert np.allclose(mortar(both, lower, "lower").gap, gap)
     below = replace(both, points=np.where(points > 10, points - 40, points))
     assert np.allclose(mortar(below, lower, "lower").gap, gap)
+
+
+@pytest.mark.parametrize("covered", [0.02, 0.3, 0.5, 0.77, 1.0])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_pressure_where_the_other_surface_ends_within_a_face(degree, covered):
+    """The edge of a block presses on a part of the last cell: its pressure is finite, and told."""
+    h = 1 / 8 / degree
+    top = rename(tensor_mesh(np.linspace(-covered * h, 1 + covered * h, 6), [0.0, 0.5, 1.0]), top="y+", contact="y-")
+    base = rename(tensor_mesh(np.linspace(-1, 2, 25), np.linspace(-2, 0, 9)), bottom="y-", contact="y+")
+    upper = Part("upper", top, MATERIAL, (), (Plate("top", {"y": -1.0}),))
+    lower = Part("lower", base, MATERIAL, (Support("bottom"),))
+    coupled = couple(Scene("s", upper, lower, 0.0, degree=degree), "lower")
+    solution = solve(coupled.problem, tol=1e-10)
+    pressure = solution.reactions[:, 0] / coupled.problem.areas
+    assert coupled.problem.areas.sum() == pytest.approx(1 + 2 * covered * h, rel=1e-12)
+    assert pressure.max() < 5.5  # 1.7 to 2.0 where a node lies below the edge
+    assert np.ptp(coupled.mortar.points[0]) < 1 + 2 * covered * h + 1e-12
+    (told,) = remarks(coupled.reduction, solution)
+    assert told.startswith("2 contacts of") or told.startswith("4 contacts of")
+    assert "touch at the rim of the other surface" in told
 
 
 @pytest.mark.parametrize("dim", [2, 3])
