@@ -2,6 +2,7 @@
 
 import logging
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -9,15 +10,18 @@ from conftest import MATERIAL, two_blocks
 from mortar_scenes import couple, press_fit, resultants, ring, slab
 from skfem.quadrature import get_quadrature
 
-from contactopt import Contact, InputError, Plate, Support, reduce, reduce_bodies, scenes, solve
+from contactopt import Contact, InputError, Material, Plate, Support, reduce, reduce_bodies, scenes, solve
+from contactopt.analysis.resolution import remarks
 from contactopt.bodies.elements import FACES, weight_at
+from contactopt.interface import segments
 from contactopt.interface.faces import Faces, cross, evaluate
 from contactopt.interface.mortar import mortar
-from contactopt.interface.segments import neighbours
+from contactopt.interface.search import Facets, facing_pairs
 from contactopt.scenes import round as round_bodies
 from contactopt.scenes.common import with_elements
 from contactopt.scenes.meshes import rename, tensor_mesh
 from contactopt.scenes.scene import Part, Scene
+from experiments.questions.facing_surfaces import mesh, pair
 
 KINDS = {  # kind of the elements, nodes of a face in the plane's own coordinates
     ("line", False): "RefQuad",
@@ -297,14 +301,128 @@ def test_surfaces_that_face_each_other_nowhere_or_twice_are_refused():
         mortar(folded, lower, "lower")
 
 
-def test_neighbours_are_found_over_gaps_and_on_graded_meshes():
-    rng = np.random.default_rng(0)
-    x, y = rng.uniform(size=(3, 200)), rng.uniform(size=(3, 300)) + np.array([[0], [0], [0.2]])
-    r, s = 10 ** rng.uniform(-3, -1, 200), 10 ** rng.uniform(-4, -1, 300)
-    found = set(zip(*neighbours((x, r), (y, s))))
-    distance = np.linalg.norm(x[:, :, None] - y[:, None], axis=0) - r[:, None] - s
-    assert {(i, j) for i, j in zip(*np.nonzero(distance < 0))} <= found
-    assert all((i, int(np.argmin(d))) in found for i, d in enumerate(distance))
+def random_facets(rng: np.random.Generator, dim: int, n: int, shift: float) -> Facets:
+    axis = rng.normal(size=(dim, n))
+    sizes = 10 ** rng.uniform(-4, -1, n), 10 ** rng.uniform(-4, -0.5, n) * rng.integers(0, 2)
+    return Facets(rng.uniform(size=(dim, n)) + shift, sizes[0], axis / np.linalg.norm(axis, axis=0), sizes[1])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("shift", [0.0, 1.0, 30.0])
+def test_every_facet_that_a_normal_meets_is_found(dim, shift):
+    rng = np.random.default_rng(int(shift))
+    own, other = random_facets(rng, dim, 90, 0.0), random_facets(rng, dim, 700, shift)
+    found = set(zip(*facing_pairs(own, other, -0.1)))
+    # Lines from within each own ball, along directions within its cone, both ways: the balls that they pass through.
+    for _ in range(20):
+        inside, off = rng.normal(size=(2, dim, 90))
+        p = own.centre + own.radius * inside / np.linalg.norm(inside, axis=0)
+        off = off - np.sum(off * own.axis, axis=0) * own.axis
+        n = own.axis * np.cos(own.angle) + np.sin(own.angle) * off / np.linalg.norm(off, axis=0)
+        v = other.centre[:, None] - p[:, :, None]
+        away = np.linalg.norm(v - np.sum(v * n[:, :, None], axis=0) * n[:, :, None], axis=0)
+        met = (away < other.radius) & (own.axis.T @ other.axis < -0.1)
+        assert set(zip(*np.nonzero(met))) <= found
+    assert len(found) < 0.2 * 90 * 700
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.001, 1.0, 100.0])
+def test_the_search_costs_the_same_at_any_gap(gap):
+    upper, lower = line(grid(2000), 1, False, y=lambda x: gap + 0 * x), line(grid(2001), 1, True)
+    with patch.object(segments, "facing_pairs", wraps=facing_pairs) as search:
+        seen = []
+        search.side_effect = lambda *a: seen.append(facing_pairs(*a)) or seen[-1]
+        m = mortar(upper, lower)
+    assert len(seen) == 1 and len(seen[0][0]) < 5000  # 4001 overlap
+    assert np.abs(m.areas - integrals(lower)).max() < 1e-15
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_areas_and_uniform_pressure_of_random_surfaces_at_any_gap(seed):
+    found = pair(seed)
+    assert found["share"] < (1e-10 if found["surfaces"] == "flat" else 5e-3)  # edges of pieces are straight
+    assert found["area"] < (1e-10 if found["surfaces"] == "flat" else 1e-3)
+    assert found["uniform pressure"] < (1e-9 if found["surfaces"] == "flat" else 1e-2)
+
+
+@pytest.mark.parametrize("shape", ["roller", "ball", "pin"])
+@pytest.mark.parametrize("seed", [3, 5])
+def test_exact_pressures_on_meshes_of_gmsh(shape, seed):
+    found = mesh(shape, seed)
+    assert abs(found["peak"]) < 0.015 and abs(found["half-width"]) < 0.02 and found["status"] == "solved"
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("cells", [3, 5, 7, 12])
+def test_contacts_below_the_steep_side_of_a_roller_stay_open(degree, cells):
+    """The cell in which the roller ends: its gap and its normals are not continued to the node beyond."""
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 41)
+    roller = line(np.sin(angle), degree, False, y=lambda x: 1 - np.sqrt(np.maximum(0.0, 1 - x**2)))
+    m = mortar(roller, line(grid(cells, -1.37, 1.21), degree, True), "lower")
+    assert np.allclose(m.normals, [[0], [1]]) and m.gap.min() > -0.1 and np.abs(m.points[0]).max() < 1 + 1e-12
+    assert m.gap[np.abs(m.points[0]) > 0.8].min() > 0.3
+    assert m.areas.sum() == pytest.approx(2.0, rel=4e-3)  # the last facets are steeper than those that face anything
+
+
+@pytest.mark.parametrize("gap", [0.02, 3.0])
+def test_a_layer_far_behind_the_nearest_one_is_none_of_a_fold(gap):
+    near, lower = line(grid(5), 1, False, y=lambda x: gap + 0 * x), line(grid(8), 1, True)
+    points = np.concatenate([near.points, near.points + np.array([[0.1], [20.0]])], axis=1)
+    both = replace(near, points=points, faces=np.concatenate([near.faces, near.faces + 6]), turn=np.tile(near.turn, 2))
+    assert np.allclose(mortar(both, lower, "lower").gap, gap)
+    below = replace(both, points=np.where(points > 10, points - 40, points))
+    assert np.allclose(mortar(below, lower, "lower").gap, gap)
+
+
+@pytest.mark.parametrize("covered", [0.02, 0.3, 0.5, 0.77, 1.0])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_pressure_where_the_other_surface_ends_within_a_face(degree, covered):
+    """The edge of a block presses on a part of the last cell: its pressure is finite, and told."""
+    h = 1 / 8 / degree
+    top = rename(tensor_mesh(np.linspace(-covered * h, 1 + covered * h, 6), [0.0, 0.5, 1.0]), top="y+", contact="y-")
+    base = rename(tensor_mesh(np.linspace(-1, 2, 25), np.linspace(-2, 0, 9)), bottom="y-", contact="y+")
+    upper = Part("upper", top, MATERIAL, (), (Plate("top", {"y": -1.0}),))
+    lower = Part("lower", base, MATERIAL, (Support("bottom"),))
+    coupled = couple(Scene("s", upper, lower, 0.0, degree=degree), "lower")
+    solution = solve(coupled.problem, tol=1e-10)
+    pressure = solution.reactions[:, 0] / coupled.problem.areas
+    assert coupled.problem.areas.sum() == pytest.approx(1 + 2 * covered * h, rel=1e-12)
+    assert pressure.max() < 5.5  # 1.7 to 2.0 where a node lies below the edge
+    assert np.ptp(coupled.mortar.points[0]) < 1 + 2 * covered * h + 1e-12
+    (told,) = remarks(coupled.reduction, solution)
+    assert told.startswith("2 contacts of") or told.startswith("4 contacts of")
+    assert "touch at the rim of the other surface" in told
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_uniform_load_closes_any_gap(dim, seed):
+    """Turned, moved, in other units, on meshes of other kinds: without lateral contraction the pressure is uniform."""
+    rng = np.random.default_rng([dim, seed])
+    unit, gap = 10 ** rng.uniform(-3, 3), 10 ** rng.uniform(-2, 1)
+    turn = np.linalg.qr(rng.normal(size=(dim, dim)))[0] * unit
+    turn *= np.sign(np.linalg.det(turn))
+
+    def block(low: float, high: float, cells: int):
+        across = [np.linspace(0, 1, n + 1) ** 1.2 for n in (cells, cells + 2)][: dim - 1]
+        made = tensor_mesh(*across, np.linspace(low, high, 3))
+        if rng.integers(2):
+            made = made.to_meshtri() if dim == 2 else made.to_meshtet()
+        ends = {"bottom": lambda x: x[-1] < low + 1e-9, "top": lambda x: x[-1] > high - 1e-9}
+        sides = made.with_boundaries(ends).boundaries
+        return type(made)(turn @ made.p, made.t).with_boundaries(sides)
+
+    names = "xyz"[:dim]
+    push = {c: -3.0 * float(f) for c, f in zip(names, turn[:, -1] / unit)}
+    soft = Material(5.0, 0.0)
+    upper = Part("upper", block(gap, gap + 1, 3), soft, (), (Plate("top", push),), "bottom")
+    lower = Part("lower", block(-2, 0, 4), soft, (Support("bottom"),), (), "top")
+    kind = "plane-strain" if dim == 2 else "solid"
+    for carrier in ("upper", "lower"):
+        contact = Contact("upper", "lower", 0.3, coupling="mortar", carrier=carrier)
+        problem = reduce_bodies(Scene("s", bodies=(upper, lower), contacts=(contact,), kind=kind)).problem
+        pressure = solve(problem, tol=1e-12).reactions[:, 0] / problem.areas
+        assert np.abs(pressure * unit ** (dim - 1) / 3 - 1).max() < 1e-8
 
 
 AREA = {"plane-strain": 1.0, "axisymmetric": np.pi, "solid": 1.0}

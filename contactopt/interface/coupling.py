@@ -59,6 +59,8 @@ class Coupling:
     planes        planes that cut the surface and on which the bodies are held along the normal only
     kind          name in COUPLINGS
     carrier       'upper' or 'lower': the side whose nodes carry the contacts
+    share         (k,) part of the faces around each contact that the areas cover: less than one
+                  where the other surface ends; None: all of them
     """
 
     upper: sp.csr_matrix
@@ -72,6 +74,7 @@ class Coupling:
     planes: tuple[SymmetryPlane, ...]
     kind: str = "matching"
     carrier: str = "lower"
+    share: np.ndarray | None = None
 
 
 def couple(

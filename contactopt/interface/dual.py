@@ -1,8 +1,11 @@
 """Integrals of dual functions over the overlap of two surfaces: areas and weights of the contacts.
 
 The mathematics is in contactopt.interface.mortar. On the covered part G of a cell, the functional int psi_v f / a_v is the
-value at vertex v of the best linear fit of f. It is computed as the mean of f plus the slopes of the fit, from hat functions
-less their means on G: the condition of the system then does not depend on where G lies in the cell, but on its shape alone.
+value at vertex v of the best linear fit of f. Where G is a part of the cell only, hat functions and
+vertices are those of the smallest similar cell around G (Overlap.window), so that fields are
+nowhere continued beyond G. The functional is computed as the mean of f plus the slopes of the fit,
+from hat functions less their means on G: the condition of the system then does not depend on where
+G lies in the cell, but on its shape alone.
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ from contactopt.interface.segments import Overlap
 SLIVER = (
     1e-11  # directions in which G extends less than the square root of this, over the cell: fields are constant there
 )
-WEAK = 1e-5  # contacts with less than this share of the covered part of their cells pass it on to a neighbour
+WEAK = 0.2  # contacts with less than this share of their area pass it on to a neighbour
 BLOCK = 200_000  # points of integration at a time
 
 
@@ -29,6 +32,8 @@ class Integrals:
 
     nodes    (k,) nodes of the own side
     areas    (k,) integrals of the hat functions over the covered part, with the weight of the integrals
+    partial  (k,) whether a cell is covered in part only: there the contact lies where its weights
+             put it, not at its node
     own      (k, nodes of the own body) and
     other    (k, nodes of the other body): weights W and W' with unit row sums
     apart    (dim, k) weighted vector from the other true surface to the own one [length]
@@ -38,6 +43,7 @@ class Integrals:
 
     nodes: np.ndarray
     areas: np.ndarray
+    partial: np.ndarray
     own: sp.csr_matrix
     other: sp.csr_matrix
     apart: np.ndarray
@@ -45,7 +51,7 @@ class Integrals:
     nearest: np.ndarray
 
 
-def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
+def integrate(own: Faces, other: Faces, points: Overlap, full: np.ndarray) -> Integrals:
     """Integrate the dual functions of one surface over its overlap with another.
 
     Parameters
@@ -56,6 +62,8 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
         The other side, with n' points.
     points
         The points of integration of the overlap, at least one.
+    full
+        (n,) integrals of the hat functions over all of the own surface.
 
     Returns
     -------
@@ -74,7 +82,8 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
         return np.add.reduceat(values, first, axis=1).T
 
     # Per cell: a_v = int phi_v, the mean of every hat function, and the matrix int (phi_v - mean) (phi_w - mean).
-    phi = own.hats(points.cell % len(own.cells), points.at)
+    begin, width = points.window[:, :, points.cell]
+    phi = own.hats((own.local(local[cell], points.at) - begin) / width)
     area = summed(phi * points.measure)  # (cell, v)
     whole = area.sum(axis=1)
     mean = area / whole[:, None]
@@ -93,10 +102,12 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
 
     # Vertices of cells become contacts; those that are hardly covered pass their share on.
     nodes, rows = np.unique(own.faces[face[:, None], own.cells[local]], return_inverse=True)
-    rows = _pass_on(rows.reshape(area.shape), area, whole)
+    rows = _pass_on(rows.reshape(area.shape), area, full[nodes])
     strong, rows = np.unique(rows, return_inverse=True)
     nodes, rows = nodes[strong], rows.reshape(area.shape)
     areas = np.bincount(rows.ravel(), area.ravel(), len(nodes))
+    partial = np.zeros(len(nodes), dtype=bool)
+    partial[rows[np.any(points.window[1][:, used] < 1, axis=0)]] = True
     # Sum int psi_i N_j over blocks of points, so that memory stays bounded: W of the own side, W' of the other, and
     # the mean vector x - x' between the true places on both surfaces.
     W = sp.csr_matrix((len(nodes), own.points.shape[1]))
@@ -134,19 +145,18 @@ def integrate(own: Faces, other: Faces, points: Overlap) -> Integrals:
         for d in range(own.dim):
             apart[d] += np.bincount(row.ravel(), vector[:, :, d].ravel(), len(nodes))
     scale = sp.diags(1 / areas)
-    return Integrals(nodes, areas, tidy(scale @ W), tidy(scale @ W_other), apart / areas, least, deepest)
+    return Integrals(nodes, areas, partial, tidy(scale @ W), tidy(scale @ W_other), apart / areas, least, deepest)
 
 
-def _pass_on(rows: np.ndarray, area: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """Contacts (cell, v) at the vertices of cells, where those that a cell hardly reaches give way to the strongest there.
+def _pass_on(rows: np.ndarray, area: np.ndarray, full: np.ndarray) -> np.ndarray:
+    """Contacts (cell, v) at the vertices of cells; those hardly covered give way to the strongest.
 
-    Next to a sliver of a covered part, the contact beyond it would ask the same as the one before it.
+    The force of the other surface's edge would be divided by an area as small as you like.
     """
-    count = rows.max(initial=-1) + 1
-    share = np.bincount(rows.ravel(), area.ravel(), count)
-    around = np.bincount(rows.ravel(), np.repeat(whole, rows.shape[1]), count)
-    weak = (share < WEAK * around)[rows]
-    best = np.argmax(np.where(weak, -1.0, area), axis=1)
+    share = np.bincount(rows.ravel(), area.ravel(), len(full)) / full
+    weak = (share < WEAK)[rows]
+    best = np.argmax(share[rows], axis=1)
+    weak &= ~np.all(weak, axis=1)[:, None]  # on a cell that is larger than the other surface
     return np.where(weak, rows[np.arange(len(rows)), best][:, None], rows)
 
 

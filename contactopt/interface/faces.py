@@ -97,11 +97,13 @@ class Faces:
         """(j, m) shape functions of the displacement at reference coordinates (dim - 1, m)."""
         return evaluate(_SHAPES[self.kind][1][self.degree], at)[0]
 
-    def hats(self, cell: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """(v, m) hat functions of the linear cell (m,) of a face at reference coordinates (dim - 1, m) of the face."""
+    def local(self, cell: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """Coordinates (dim - 1, m) on linear cells (m,), 0 to 1, of places `at` on the face."""
         first, last = self.places[:, self.cells[:, 0]], self.places[:, self.cells[:, [1, -1]]].max(axis=2)
-        width = np.where(last > first, last - first, 1.0)
-        local = (at - first[:, cell]) / width[:, cell]
+        return np.asarray((at - first[:, cell]) / np.where(last > first, last - first, 1.0)[:, cell])
+
+    def hats(self, local: np.ndarray) -> np.ndarray:
+        """(v, m) hat functions of a linear cell at coordinates (dim - 1, m) on it."""
         return evaluate(FACES[self.kind][1], local)[0]
 
     def locations(self, face: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

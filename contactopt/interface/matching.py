@@ -110,8 +110,7 @@ def _match(upper: Surface, lower: Surface) -> np.ndarray:
         directions.append((np.tile(mean[:, None], k), np.zeros(k)))
     distances = []
     for direction, slack in directions:
-        partner, off, height = _along(upper, lower, direction, MATCH * spacing)
-        allowed = np.minimum(MATCH + slack * np.abs(height) / max(spacing, 1e-300), LOOSEST) * max(spacing, 1e-300)
+        partner, off, allowed = _along(upper, lower, direction, slack, max(spacing, 1e-300))
         if np.all(off <= allowed) and len(np.unique(partner)) == k:
             return partner
         distances.append(float(off.max()))
@@ -136,13 +135,16 @@ def _turn(surface: Surface) -> np.ndarray:
 
 
 def _along(
-    upper: Surface, lower: Surface, direction: np.ndarray, enough: float
+    upper: Surface, lower: Surface, direction: np.ndarray, slack: np.ndarray, spacing: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The partner (k,) of every lower contact along a direction (dim, k), its distance from that line and its height.
+    """The partner (k,) of every lower contact along a direction (dim, k), its distance from that
+    line, and what is allowed.
 
-    Each search starts at the nearest contact of the upper surface and moves along the line to the height of the contact
-    found, until it finds the same one again. Contacts that face the same way as the lower one, on the far side of a pin in
-    a bush, do not count. Where the search ends further off than `enough`, all contacts of the upper surface are compared.
+    Each search starts at the nearest contact of the upper surface and moves along the line to the
+    height of the contact found, until it finds the same one again. Contacts that face the same way
+    as the lower one, on the far side of a pin in a bush, do not count. Where the search ends further
+    off than is allowed, all contacts of the upper surface are compared, up to the first ones that
+    have no partner among them either: then the surfaces do not match.
     """
     count = lower.points.shape[1]
     tree, height = KDTree(upper.points.T), np.zeros(count)
@@ -154,8 +156,15 @@ def _along(
         height = np.sum((upper.points[:, found] - lower.points) * direction, axis=0)
         if np.array_equal(before, found):
             break
-    off = np.linalg.norm(upper.points[:, found] - lower.points - height * direction, axis=0)
-    lost = np.flatnonzero(off > enough)
+
+    def measured(some: np.ndarray | slice) -> tuple[np.ndarray, np.ndarray]:
+        apart = upper.points[:, found[some]] - lower.points[:, some]
+        height = np.sum(apart * direction[:, some], axis=0)
+        allowed = np.minimum(MATCH + slack[some] * np.abs(height) / spacing, LOOSEST) * spacing
+        return np.linalg.norm(apart - height * direction[:, some], axis=0), allowed
+
+    off, allowed = measured(slice(None))
+    lost = np.flatnonzero(off > allowed)
     for some in (lost[i : i + CHUNK] for i in range(0, len(lost), CHUNK)):
         apart = upper.points[:, None] - lower.points[:, some, None]  # (dim, some, all)
         heights = np.einsum("dij,di->ij", apart, direction[:, some])
@@ -164,6 +173,7 @@ def _along(
         best = np.argmin(distance, axis=1)
         better = distance[np.arange(len(some)), best] < off[some]
         found[some[better]] = best[better]
-    height = np.sum((upper.points[:, found] - lower.points) * direction, axis=0)
-    off = np.linalg.norm(upper.points[:, found] - lower.points - height * direction, axis=0)
-    return found, off, height
+        off[some], allowed[some] = measured(some)
+        if np.any(off[some] > allowed[some]):
+            break
+    return found, off, allowed

@@ -16,9 +16,11 @@ is the value at contact i of its best linear fit on the covered part. Hence:
 * Rows of W and of W' add up to one, so that forces are equal and opposite.
 * The psi_i add up to one, so that a uniform pressure, r_i = p a_i, gives every node of both sides exactly the integral of
   its shape function: the patch test. It holds on partly covered faces too.
-* A contact outside the other surface, whose cell is partly covered, keeps its place: fields are continued linearly to it.
-  Contacts without any covered cell are left out, and those that a covered part hardly reaches (WEAK) pass their share of
-  it on to the strongest contact of the same cell.
+* A cell that is partly covered is cut down to the smallest similar cell around G, with hat
+  functions of its own: a contact outside the other surface moves to its edge, where the force acts.
+  Continued to the node, the normals and the gap of a steep side mean nothing. Contacts without any
+  covered cell are left out. Those that are hardly covered (WEAK) pass their share on to the
+  strongest contact of the cell: the force of an edge over the area of a sliver is no pressure.
 
 **Moments.** Forces act at W x and W' x'. The vector e_i = W_ij x_j - W'_ij x'_j between these places is zero where the
 surfaces lie on each other, but not where both are polygons inscribed in one curve; the moment of interface forces is the
@@ -66,7 +68,7 @@ import scipy.sparse as sp
 from scipy.spatial import KDTree
 from skfem.quadrature import get_quadrature
 
-from contactopt.bodies.elements import FACES
+from contactopt.bodies.elements import FACES, weight_at
 from contactopt.errors import InputError
 from contactopt.interface.dual import collect, integrate, tidy
 from contactopt.interface.faces import Faces, cross, evaluate
@@ -87,7 +89,8 @@ class Mortar:
     areas    (k,) areas of the covered parts, with the weight of the integrals
     normals  (dim, k) unit normals, outward from the lower body
     gap      (k,) initial gap [length]
-    points   (dim, k) positions of the nodes
+    points   (dim, k) positions: of the nodes, or of the other surface's edge if it ends before
+    share    (k,) the areas over those of the faces: less than one where the other surface ends
     weights  two (k, nodes of the body): what the displacement of the nodes contributes to that of the contacts
     alone    two (k, nodes of the body): the displacement at the contact's own node, and at the place facing it
     lever    (dim, k) l_i, from the other body to the own one [length]; zero where the surfaces lie on each other
@@ -101,6 +104,7 @@ class Mortar:
     normals: np.ndarray
     gap: np.ndarray
     points: np.ndarray
+    share: np.ndarray
     weights: tuple[sp.csr_matrix, sp.csr_matrix]
     alone: tuple[sp.csr_matrix, sp.csr_matrix]
     lever: np.ndarray
@@ -153,7 +157,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     first = 0 if own == "upper" else 1
     mine, theirs = pair[first], pair[1 - first]
     # Where the surfaces face each other, along the normals of the side that carries the contacts.
-    normals, sizes = contact_normals(mine)
+    normals, sizes, full = contact_normals(mine)
     points = overlap(mine, theirs, normals)
     if own is None and _contacts(theirs, points.face) > _contacts(mine, points.cell // len(mine.cells)):
         return mortar(upper, lower, "upper")
@@ -164,7 +168,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
             "check the boundaries' names, the bodies' positions, and which of them is the upper one."
         )
     # Integrals of the dual functions: areas a_i, weights W and W', and the mean vector x - x' between the sides.
-    sums = integrate(mine, theirs, points)
+    sums = integrate(mine, theirs, points, full)
     # Normals are always those of the lower body: its own at its nodes, or as they are seen from the contacts.
     n = normals[:, sums.nodes] if first == 1 else _seen(theirs, sums.other)
     n = mine.mirrored(n, sums.nodes)
@@ -178,6 +182,8 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
         lever = levers(mine.mirrored(e.T, sums.nodes), -sign * n, gap, sizes[sums.nodes])
     carried = rotations_times(lever, mine, sums.nodes) if np.any(lever) else []
     x = mine.points[:, sums.nodes]
+    fixed = ~sums.partial if mine.mirror is None else ~sums.partial | mine.mirror[:, sums.nodes]
+    x = np.where(fixed, x, (sums.own @ mine.points.T).T)
     if sums.least < -OVERLAP * np.ptp(x, axis=1).max():
         where = ", ".join(f"{c:.4g}" for c in sums.nearest)
         _log.warning(
@@ -186,7 +192,8 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, sums.nodes, normals)
     if first == 1:
         weights, alone = weights[::-1], alone[::-1]
-    return Mortar(first, sums.nodes, sums.areas, n, gap, x, weights, alone, lever, carried)
+    share = sums.areas / full[sums.nodes]
+    return Mortar(first, sums.nodes, sums.areas, n, gap, x, share, weights, alone, lever, carried)
 
 
 def _seen(other: Faces, weights: sp.csr_matrix) -> np.ndarray:
@@ -204,9 +211,9 @@ def _contacts(surface: Faces, faces: np.ndarray) -> int:
     return len(np.unique(surface.faces[np.unique(faces)][:, surface.cells]))
 
 
-def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the outward normals at contact nodes from the linear fits on all cells around them, and the sizes of
-    these cells.
+def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Compute the outward normals at contact nodes from the linear fits on all cells around them,
+    the sizes of these cells, and the integrals of the hat functions over them.
 
     Parameters
     ----------
@@ -216,10 +223,11 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     tuple
-        Unit normals (dim, n) and sizes (n,) [length]; both are zero at points that are no contact nodes.
+        Unit normals (dim, n), sizes (n,) [length] and integrals (n,), with the surface's weight.
+        All are zero at points that are no contact nodes.
     """
     n, count = surface.points.shape[1], len(surface.faces)
-    total, area = np.zeros(surface.points.shape), np.zeros(n)
+    total, area, full = np.zeros(surface.points.shape), np.zeros(n), np.zeros(n)
     reference, hat = FACES[surface.kind][:2]
     at, share = get_quadrature(reference, 4)
     phi = evaluate(hat, at)[0]
@@ -228,17 +236,20 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray]:
     for cell in surface.cells:
         places = np.tile(surface.places[:, cell] @ phi, count)
         face = np.repeat(np.arange(count), at.shape[1])
-        normal = cross(surface.locations(face, places)[1]) * surface.turn[face]
+        x, tangents = surface.locations(face, places)
+        normal = cross(tangents) * surface.turn[face]
         split = normal.reshape(len(normal), count, -1)
         length = np.linalg.norm(split, axis=0)
+        weighted = length * np.broadcast_to(weight_at(surface.weight, x), len(face)).reshape(length.shape)
         for v, corner in enumerate(cell):
             node = surface.faces[:, corner]
             area += np.bincount(node, length @ (phi[v] * share), n)
+            full += np.bincount(node, weighted @ (phi[v] * share), n)
             for d in range(len(total)):
                 total[d] += np.bincount(node, split[d] @ (dual[v] * share), n)
     total = surface.mirrored(total)
     normals = np.divide(total, np.linalg.norm(total, axis=0), where=area > 0, out=np.zeros_like(total))
-    return normals, area ** (1 / (surface.dim - 1))
+    return normals, area ** (1 / (surface.dim - 1)), full
 
 
 def _alone(

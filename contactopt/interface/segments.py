@@ -19,6 +19,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine, RefTri
@@ -26,8 +28,10 @@ from skfem.refdom import RefLine, RefTri
 from contactopt.bodies.elements import weight_at
 from contactopt.errors import InputError
 from contactopt.interface.faces import Faces, cross, face_normals, patches
+from contactopt.interface.search import Facets, facing_pairs
 
 SMALLEST = 1e-8  # cells that are covered by less than this fraction count as uncovered: the noise of coordinates
+WHOLE = 1e-9  # and those that are covered but for less than this count as covered
 FACING = -0.1  # the cosine between normals of faces that face each other is below this
 FOLD = 1.05  # a cell that is covered by more than this faces two layers of the other surface
 # degrees added to the quadrature where a face is distorted, so that integrands are no polynomials: on flat interfaces, where
@@ -45,6 +49,8 @@ class Overlap:
     there   (dim - 1, g) reference coordinates on it
     axes    (g, dim - 1, dim) directions across which both places coincide: the line between them is normal to these
     measure (g,) area that every point stands for, with the weight of the integrals
+    window  (2, dim - 1, own cells) begin and width, from 0 to 1, of the smallest similar cell around
+            the covered part
     """
 
     cell: np.ndarray
@@ -53,6 +59,7 @@ class Overlap:
     there: np.ndarray
     axes: np.ndarray
     measure: np.ndarray
+    window: np.ndarray
 
 
 def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
@@ -80,65 +87,99 @@ def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     return _lines(own, other, normals) if own.dim == 2 else _polygons(own, other)
 
 
-def neighbours(a: tuple[np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Find the pairs of balls of two sets that may face each other.
+@dataclass(frozen=True, eq=False)
+class _Polygons:
+    """The p polygons, or lines, that a surface is cut into.
 
-    Balls are apart by at most twice the distance of the nearest ones, so that surfaces with a gap find each other.
-    Those of b are searched by size, each octave in a tree of its own: graded meshes need no more pairs than even ones.
-
-    Parameters
-    ----------
-    a, b
-        Centres (dim, n) and radii (n,) of the balls of each set [length].
-
-    Returns
-    -------
-    tuple
-        The numbers (j,) of the balls of a and of b in each pair.
+    vertices (dim, p, v);  at (dim - 1, p, v) their reference coordinates;  face (p,);  cell (p,)
+    normal   (dim, p) outward unit normals;  centre (dim, p);  radius (p,) of a ball around each
     """
-    (x, r), (y, s) = a, b
-    octave = np.floor(np.log2(s / s.max()))
-    trees = []
-    for level in np.unique(octave):
-        chosen = np.flatnonzero(octave == level)
-        trees.append((chosen, KDTree(y[:, chosen].T), s[chosen].max()))
-    nearest = [(chosen, *tree.query(x.T)) for chosen, tree, _ in trees]
-    apart = np.min([distance - s[chosen[which]] - r for chosen, distance, which in nearest], axis=0)
-    reach = r + 2 * np.maximum(apart, 0.0)
-    pairs = []
-    for chosen, tree, radius in trees:
-        hits = tree.query_ball_point(x.T, reach + radius)
-        count = np.array([len(hit) for hit in hits])
-        if count.any():
-            flat = np.concatenate([np.asarray(hit, dtype=int) for hit in hits])
-            pairs.append((np.repeat(np.arange(len(count)), count), chosen[flat]))
-    first, second = (np.concatenate([p[i] for p in pairs]) for i in (0, 1))
-    order = np.lexsort((second, first))
-    return first[order], second[order]
+
+    vertices: np.ndarray
+    at: np.ndarray
+    face: np.ndarray
+    cell: np.ndarray
+    normal: np.ndarray
+    centre: np.ndarray
+    radius: np.ndarray
 
 
-def _pieces(surface: Faces, own: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Polygons of a surface: vertices (dim, p, v), reference coordinates (dim - 1, p, v), faces (p,), cells (p,)."""
+def _cut(surface: Faces, own: bool) -> _Polygons:
     local, cell = patches(surface, own)
     count = len(surface.faces)
-    vertices = surface.points[:, surface.faces[:, local].reshape(-1, local.shape[1])]
+    x = surface.points[:, surface.faces[:, local].reshape(-1, local.shape[1])]
     at = np.tile(surface.places[:, local], (1, count, 1))
     face = np.repeat(np.arange(count), len(local))
-    return vertices, at, face, face * len(surface.cells) + np.tile(cell, count)
+    centre = x.mean(axis=2)
+    radius = np.linalg.norm(x - centre[:, :, None], axis=0).max(axis=1)
+    normal = _polygon_normals(x) * surface.turn[face]
+    return _Polygons(x, at, face, face * len(surface.cells) + np.tile(cell, count), normal, centre, radius)
 
 
-def _facing(own: Faces, other: Faces) -> tuple[np.ndarray, ...]:
-    """Pairs of polygons that may face each other, the polygons of both sides, and the outward normals of the own ones."""
-    sides = [_pieces(own, True), _pieces(other, False)]
-    centres = [x.mean(axis=2) for x, *_ in sides]
-    radii = [np.linalg.norm(x - c[:, :, None], axis=0).max(axis=1) for (x, *_), c in zip(sides, centres)]
-    normals = [_polygon_normals(x) * surface.turn[face] for (x, _, face, _), surface in zip(sides, (own, other))]
-    if not len(own.faces) or not len(other.faces):
-        empty = np.zeros(0, dtype=int)
-        return empty, empty, *sides, normals[0]
-    first, second = neighbours((centres[0], radii[0]), (centres[1], radii[1]))
-    facing = np.sum(normals[0][:, first] * normals[1][:, second], axis=0) < FACING
-    return first[facing], second[facing], *sides, normals[0]
+def _facing(mine: _Polygons, theirs: _Polygons, spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of polygons that may face each other; own ones see within `spread` (p,) of their normals."""
+    none = np.zeros(0, dtype=int)
+    if not len(mine.face) or not len(theirs.face):
+        return none, none
+    own = Facets(mine.centre, mine.radius, mine.normal, spread)
+    other = Facets(theirs.centre, theirs.radius, theirs.normal, np.zeros(len(theirs.face)))
+    first, second = facing_pairs(own, other, FACING)
+    facing = np.sum(mine.normal[:, first] * theirs.normal[:, second], axis=0) < FACING
+    return first[facing], second[facing]
+
+
+def _nearest(
+    other: Faces,
+    mine: _Polygons,
+    theirs: _Polygons,
+    pairs: tuple[np.ndarray, np.ndarray],
+    content: np.ndarray,
+    middle: np.ndarray,
+    direction: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mask (q,) of the pieces on that layer of the other surface which the own one faces, and how
+    much of each own cell they cover.
+
+    `pairs` are the own and the other polygon of each piece, `content` (q,) is its part of the own
+    cell, `middle` (dim, q) a place within it, and `direction` (dim, q) the normal there.
+
+    A line along the normal may meet the other surface more than once, and goes on behind the own
+    one as well. Behind it counts what overlaps no deeper than about twice the distance of the
+    nearest place of the other surface. Where a cell is covered more than once, layers count that
+    are no further away than twice the nearest one. If these still cover the cell more than once,
+    the surface is folded: an InputError.
+    """
+    first, second = pairs
+    m, cell = theirs.normal[:, second], mine.cell[first]
+    height = np.sum((theirs.centre[:, second] - middle) * m, axis=0) / np.sum(direction * m, axis=0)
+    size = mine.radius[first] + theirs.radius[second]
+    keep = content > 0
+    deep = np.flatnonzero(keep & (height < -size))
+    if len(deep):
+        nearest = KDTree(theirs.centre.T).query(mine.centre[:, first[deep]].T)[0]
+        keep[deep] = -height[deep] <= 2 * nearest + size[deep]
+    cells = mine.cell.max() + 1
+    covered = np.bincount(cell[keep], content[keep], cells)
+    several = np.flatnonzero(keep & (covered[cell] > FOLD))
+    if len(several):
+        layer, away = _layers(other, cell[several], theirs.face[second[several]]), np.abs(height[several])
+        least, nearest = np.full(layer.max() + 1, np.inf), np.full(cells, np.inf)
+        np.minimum.at(least, layer, away)
+        np.minimum.at(nearest, cell[several], away)
+        keep[several] = least[layer] <= 2 * nearest[cell[several]] + size[several]
+        covered = np.bincount(cell[keep], content[keep], cells)
+        _check_fold(other, mine, covered)
+    return keep & (covered[cell] > SMALLEST), covered
+
+
+def _layers(other: Faces, cell: np.ndarray, face: np.ndarray) -> np.ndarray:
+    """Numbers (q,) of the layers of faces (q,) seen from cells (q,): those of a layer hang together."""
+    nodes = other.faces[face, : other.corners]
+    known, hub = np.unique(cell[:, None] * other.points.shape[1] + nodes, return_inverse=True)
+    q = len(face)
+    ends = np.repeat(np.arange(q), nodes.shape[1]), q + hub.ravel()
+    graph = sp.coo_matrix((np.ones(len(ends[0])), ends), (q + len(known),) * 2)
+    return np.asarray(connected_components(graph, directed=False)[1][:q])
 
 
 def _polygon_normals(x: np.ndarray) -> np.ndarray:
@@ -151,18 +192,23 @@ def _polygon_normals(x: np.ndarray) -> np.ndarray:
 
 
 def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
-    first, second, mine, theirs, _ = _facing(own, other)
-    vertices, at, face, cell = mine
-    start, width = at[:, first, 0], at[:, first, 1] - at[:, first, 0]
-    ends = own.faces[face[first][:, None], own.cells[cell[first] % len(own.cells)]]
-    n0, turn = normals[:, ends[:, 0]], normals[:, ends[:, 1]] - normals[:, ends[:, 0]]
-    s = np.sort(
-        [_project(own, face[first], start, width, n0, turn, theirs[0][:, second, i]) for i in (0, 1)], axis=0
-    ).clip(0.0, 1.0)
-    length = s[1] - s[0]
-    covered = np.bincount(cell[first], length, len(own.faces) * len(own.cells))
-    _check_fold(other, vertices, cell, covered)
-    keep = np.flatnonzero((length > 0) & (covered[cell[first]] > SMALLEST))
+    mine, theirs = _cut(own, True), _cut(other, False)
+    ends = own.faces[mine.face[:, None], own.cells[mine.cell % len(own.cells)]]  # (p, 2)
+    turn = np.sum(mine.normal[:, :, None] * normals[:, ends], axis=0).clip(-1.0, 1.0)
+    first, second = _facing(mine, theirs, np.arccos(turn.min(axis=1)))
+    face = mine.face[first]
+    start, width = mine.at[:, first, 0], mine.at[:, first, 1] - mine.at[:, first, 0]
+    n0, n1 = normals[:, ends[first, 0]], normals[:, ends[first, 1]]
+    turn = n1 - n0
+    x = theirs.vertices[:, second]
+    s = np.sort([_project(own, face, start, width, n0, turn, x[:, :, i]) for i in (0, 1)], axis=0).clip(0.0, 1.0)
+    length, middle = s[1] - s[0], s.mean(axis=0)
+    direction = n0 + turn * middle
+    direction /= np.linalg.norm(direction, axis=0)
+    x = own.locations(face, start + width * middle)[0]
+    keep, covered = _nearest(other, mine, theirs, (first, second), length, x, direction)
+    keep = np.flatnonzero(keep)
+    window = _windows(own, mine.cell[first[keep]], s[:, None, keep].transpose(1, 2, 0), covered)
     points, share = get_quadrature(RefLine, 8 + CURVED * (own.curved or other.curved))
     local = s[0, keep, None] + length[keep, None] * points[0]
     m = len(share)
@@ -170,10 +216,11 @@ def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     here = start[:, pair] + width[:, pair] * local.ravel()
     n = n0[:, pair] + turn[:, pair] * local.ravel()
     axes = (np.stack([n[1], -n[0]]) / np.linalg.norm(n, axis=0)).T[:, None, :]
-    x, tangents = own.locations(face[first[pair]], here)
-    there = other.locate(theirs[2][second[pair]], x, axes, np.array([[0.5]]))
+    x, tangents = own.locations(face[pair], here)
+    there = other.locate(theirs.face[second[pair]], x, axes, np.array([[0.5]]))
     measure = (share * length[keep, None]).ravel() * np.abs(width[0, pair]) * np.linalg.norm(tangents[:, 0], axis=0)
-    return Overlap(cell[first[pair]], here, theirs[2][second[pair]], there, axes, measure * weight_at(own.weight, x))
+    measure *= weight_at(own.weight, x)
+    return Overlap(mine.cell[first[pair]], here, theirs.face[second[pair]], there, axes, measure, window)
 
 
 def _project(
@@ -204,9 +251,27 @@ def _project(
     return s
 
 
-def _check_fold(other: Faces, vertices: np.ndarray, cell: np.ndarray, covered: np.ndarray) -> None:
+def _windows(own: Faces, cell: np.ndarray, corners: np.ndarray, covered: np.ndarray) -> np.ndarray:
+    """Begin and width (2, dim - 1, cells) of the smallest similar cell around the corners
+    (dim - 1, q, v) of pieces on cells (q,); all of a cell where it is covered as a whole."""
+    window = np.stack([np.zeros((own.dim - 1, len(covered))), np.ones((own.dim - 1, len(covered)))])
+    low, high = np.ones(window[0].shape), np.zeros(window[0].shape)
+    for d, x in enumerate(corners):
+        np.minimum.at(low[d], cell, x.min(axis=1))
+        np.maximum.at(high[d], cell, x.max(axis=1))
+    if own.corners == 3:  # from the corner up to the parallel of the third side
+        far = np.zeros(len(covered))
+        np.maximum.at(far, cell, corners.sum(axis=0).max(axis=1))
+        high = low + far - low.sum(axis=0)
+    partial = (covered > SMALLEST) & (covered < 1 - WHOLE)
+    low, high = low.clip(0.0, 1.0), high.clip(0.0, 1.0)
+    window[:, :, partial] = np.stack([low, high - low])[:, :, partial]
+    return window
+
+
+def _check_fold(other: Faces, mine: _Polygons, covered: np.ndarray) -> None:
     if covered.max(initial=0.0) > FOLD:
-        where = vertices[:, np.argmax(cell == np.argmax(covered))].mean(axis=1)
+        where = mine.centre[:, np.argmax(mine.cell == np.argmax(covered))]
         raise InputError(
             f"body '{other.name}': its contact boundary is folded, two layers of it face the same place near "
             f"({', '.join(f'{c:.4g}' for c in where)}); name only the part of it that can touch."
@@ -214,46 +279,53 @@ def _check_fold(other: Faces, vertices: np.ndarray, cell: np.ndarray, covered: n
 
 
 def _polygons(own: Faces, other: Faces) -> Overlap:
-    first, second, mine, theirs, outward = _facing(own, other)
-    vertices, at, face, cell = mine
-    origin = vertices.mean(axis=2)
-    along = vertices[:, :, 1] - vertices[:, :, 0]
+    mine, theirs = _cut(own, True), _cut(other, False)
+    outward, origin = mine.normal, mine.centre
+    first, second = _facing(mine, theirs, np.zeros(len(mine.face)))
+    along = mine.vertices[:, :, 1] - mine.vertices[:, :, 0]
     along = along - np.sum(along * outward, axis=0) * outward
     along /= np.linalg.norm(along, axis=0)
     axes = np.stack([along, np.cross(outward, along, axis=0)]).transpose(2, 0, 1)  # (p, 2, 3)
-    frame = np.einsum("pad,dpv->pva", axes, vertices - origin[:, :, None])
+    frame = np.einsum("pad,dpv->pva", axes, mine.vertices - origin[:, :, None])
     area = _areas(frame)
     frame = np.where((area < 0)[:, None, None], frame[:, ::-1], frame)  # counterclockwise
     size = np.sqrt(np.abs(area))
-    subject = np.einsum("pad,dpv->pva", axes[first], theirs[0][:, second] - origin[:, first, None])
+    subject = np.einsum("pad,dpv->pva", axes[first], theirs.vertices[:, second] - origin[:, first, None])
     low, high = frame.min(axis=1)[first], frame.max(axis=1)[first]
     near = np.flatnonzero(np.all((subject.max(axis=1) > low) & (subject.min(axis=1) < high), axis=1))
     first, second = first[near], second[near]
     polygon = _clip(subject[near], frame[first], size[first])
     # a fan of triangles around the first vertex
     triangles = np.stack([np.repeat(polygon[:, :1], polygon.shape[1] - 2, axis=1), polygon[:, 1:-1], polygon[:, 2:]], 2)
-    pair = np.repeat(np.arange(len(first)), triangles.shape[1])
-    triangles = triangles.reshape(-1, 3, 2)
-    content = np.abs(_areas(triangles))
-    full = np.bincount(cell, np.abs(area), len(own.faces) * len(own.cells))
-    covered = np.bincount(cell[first[pair]], content, len(full)) / np.where(full > 0, full, 1.0)
-    _check_fold(other, vertices, cell, covered)
-    keep = (content > 1e-15 * np.abs(area)[first[pair]]) & (covered[cell[first[pair]]] > SMALLEST)
-    pair, triangles, content = pair[keep], triangles[keep], content[keep]
+    content = np.abs(_areas(triangles.reshape(-1, 3, 2))).reshape(triangles.shape[:2])
+    full = np.bincount(mine.cell, np.abs(area), len(own.faces) * len(own.cells))
+    part = content.sum(axis=1) / full[mine.cell[first]]
+    middle = origin[:, first] + np.einsum("pad,pa->dp", axes[first], polygon.mean(axis=1))
+    keep, covered = _nearest(other, mine, theirs, (first, second), part, middle, outward[:, first])
+    # the corners of pieces on cells that are covered in part only, in the coordinates of the cells
+    part_of = np.flatnonzero(keep & (covered[mine.cell[first]] < 1 - WHOLE))
+    v = polygon.shape[1]
+    mine_at = np.repeat(first[part_of], v)
+    x = origin[:, mine_at] + np.einsum("gad,ga->dg", axes[mine_at], polygon[part_of].reshape(-1, 2))
+    here = own.locate(mine.face[mine_at], x, axes[mine_at], mine.at[:, mine_at].mean(axis=2))
+    corners = own.local(mine.cell[mine_at] % len(own.cells), here).reshape(2, -1, v)
+    window = _windows(own, mine.cell[first[part_of]], corners, covered)
+    piece, fan = np.nonzero(keep[:, None] & (content > 1e-15 * np.abs(area)[first, None]))
+    triangles, content = triangles[piece, fan], content[piece, fan]
     points, share = get_quadrature(RefTri, _order(own, other))
     corner = np.stack([1 - points[0] - points[1], points[0], points[1]])
     y = np.einsum("vq,tva->tqa", corner, triangles).reshape(-1, 2)
-    pair = np.repeat(pair, len(share))
+    piece = np.repeat(piece, len(share))
     content = (content[:, None] * share / share.sum()).ravel()
-    mine_at, theirs_at = first[pair], second[pair]
+    mine_at, theirs_at = first[piece], second[piece]
     E = axes[mine_at]
     x = origin[:, mine_at] + np.einsum("gad,ga->dg", E, y)
-    here = own.locate(face[mine_at], x, E, at[:, mine_at].mean(axis=2))
-    there = other.locate(theirs[2][theirs_at], x, E, theirs[1][:, theirs_at].mean(axis=2))
-    place, tangents = own.locations(face[mine_at], here)
+    here = own.locate(mine.face[mine_at], x, E, mine.at[:, mine_at].mean(axis=2))
+    there = other.locate(theirs.face[theirs_at], x, E, theirs.at[:, theirs_at].mean(axis=2))
+    place, tangents = own.locations(mine.face[mine_at], here)
     seen = np.abs(np.linalg.det(np.einsum("gad,dcg->gac", E, tangents)))
     measure = content * np.linalg.norm(cross(tangents), axis=0) / seen * weight_at(own.weight, place)
-    return Overlap(cell[mine_at], here, theirs[2][theirs_at], there, E, measure)
+    return Overlap(mine.cell[mine_at], here, theirs.face[theirs_at], there, E, measure, window)
 
 
 def _order(own: Faces, other: Faces) -> int:

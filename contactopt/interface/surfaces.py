@@ -63,7 +63,8 @@ def couple_surfaces(scene: Scene, pair: Contact, upper: AssembledBody, lower: As
     areas, places, planes = m.areas[order], m.points[:, order], tuple(symmetry_planes(contacts))
     cells, carrier = renumbered(cells, order), SIDES[m.own]
     log.info("contact '%s': mortar, %d contacts on the %s body '%s'", pair.name, len(order), carrier, sides[m.own].name)
-    return Coupling(maps[0], maps[1], frames, m.gap[order], areas, places, chart, cells, planes, "mortar", carrier)
+    gap, share = m.gap[order], m.share[order]
+    return Coupling(maps[0], maps[1], frames, gap, areas, places, chart, cells, planes, "mortar", carrier, share)
 
 
 def _mesh(surface: Surface) -> Mesh:

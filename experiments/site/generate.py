@@ -36,6 +36,7 @@ ACCURACY = (
     "accuracy",
     "elements",
     "patch_test",
+    "facing_surfaces",
     "hertz",
     "stick_ratio",
     "cattaneo",
