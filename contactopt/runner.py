@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from contactopt.analysis.accuracy import Estimate, refine
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.paths import PathResult, solve_states
 from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
@@ -34,7 +33,7 @@ from contactopt.scenes.scene import Part, Scene
 from contactopt.solving.methods import default_method, find_method
 
 if TYPE_CHECKING:
-    from contactopt.adaptivity.loop import AdaptedEstimate
+    from contactopt.accuracy.estimate import Estimate
     from contactopt.scenes.scene_files import SceneFile
 
 Note = Callable[[str], None]
@@ -59,7 +58,7 @@ class Result:
     zones: tuple[float, ...]
     summary: dict[str, Any]
     path: PathResult | None = None
-    estimate: Estimate | AdaptedEstimate | None = None
+    estimate: Estimate | None = None
 
     def __repr__(self) -> str:
         s = self.summary
@@ -173,10 +172,10 @@ def run(
     elements : across the contact half-width
     accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
         sentence in `Result.estimate` says why not; `elements` only scales the first mesh
-    quantity : a name in contactopt.analysis.quantities.QUANTITIES; of one of several pairs of surfaces 'NAME:PAIR'; or one of
+    quantity : a name of contactopt.derivatives.outputs; of one of several pairs of surfaces 'NAME:PAIR'; or one of
         contactopt.analysis.places, such as 'von_mises:BODY:BOUNDARY' or 'pressure@X,Y'
-    adaptive : whether meshes are refined only where the quantity needs it (contactopt.adaptivity), each body by itself, and not
-        everywhere; quadrilaterals become triangles. More quantities can be bounded then, see contactopt.derivatives.outputs
+    adaptive : whether meshes are refined only where the quantity needs it (contactopt.accuracy), each body by itself, and not
+        everywhere; quadrilaterals become triangles
     max_unknowns, time_limit, max_memory : bounds on the search for the accuracy: unknowns of a mesh, seconds and GB of all. No
         further mesh is begun that would pass one; the result is then the best answer so far, with its estimate
         All arguments from `method` to here may stand in a scene file; those given here win.
@@ -378,20 +377,17 @@ def _aim(accuracy: float | None, quantity: str | None, adaptive: bool, bounds: d
 
 def _solve(
     states: tuple[Scene, ...], aim: Aim | None, options: Options
-) -> tuple[Solved, PathResult | None, Estimate | AdaptedEstimate | None]:
+) -> tuple[Solved, PathResult | None, Estimate | None]:
     """The scene or its load path, on its own mesh or on meshes refined to an accuracy."""
     if aim is None:
         solved = solve_states(states, options=options)
         return solved, solved.path, None
-    if not aim.adaptive:
-        mesh, estimate = refine(states, aim.quantity, aim.accuracy, options, aim.limits)
-        return mesh.solved, mesh.solved.path, estimate
-    if len(states) > 1:
-        raise InputError(f"scene '{states[0].name}' has a load path, which adaptive refinement does not follow.")
-    from contactopt.adaptivity import refine_locally  # it brings the room of derivatives with it
+    from contactopt.accuracy.loop import refine  # it brings the room of derivatives with it
 
-    solved, adapted = refine_locally(states[0], aim.quantity, aim.accuracy, options, aim.limits)
-    return solved, None, adapted
+    solved, estimate = refine(
+        states, aim.quantity, aim.accuracy, options, aim.limits, aim.adaptive
+    )
+    return solved, solved.path, estimate
 
 
 def _summary(
@@ -399,7 +395,7 @@ def _summary(
     method: str,
     backends: tuple[str, str],
     path: PathResult | None,
-    estimate: Estimate | AdaptedEstimate | None,
+    estimate: Estimate | None,
 ) -> dict[str, Any]:
     """What is known of the answer but for the seconds: half-widths and pressure are the quantities that accuracy bounds."""
     reduction, solution = solved.reduction, solved.solution

@@ -9,7 +9,10 @@ SMOOTH = 3, 6  # rings of nodes left out and fitted where contact ends by itself
 NEAR = 1, 2  # the same where the values are straight only next to the edge
 INNER = 0.3  # share of the half-width from which on the squared pressure on a line is fitted
 OUTER = 2  # nodes next to the edge of contact that this fit leaves out
-WINDOW = 0.5  # share of the distance from the largest pressure to the edge over which the peak is fitted
+FITTED = {2: 5, 3: 13}  # nodes to which the square of the pressure is fitted around a peak, by dimension
+NEIGHBOURS = {2: 5, 3: 9}  # nodes among which a local maximum is the largest, itself among them
+MOST_PEAKS = 8  # local maxima that are looked at
+WITHIN = 0.05  # least uncertainty of an edge that is read between nodes, over the distance of the nodes
 
 # The zone loop (contactopt.analysis.zone).
 AGREE = 0.05  # two zones agree when they differ by less than this fraction of an element

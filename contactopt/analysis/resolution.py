@@ -34,15 +34,34 @@ def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
     """
     if not solution.solved:
         return ()
+    return tuple(
+        f"too few contacts of '{name}' touch, {len(own)} of {count}, to show how the pressure is distributed: "
+        "refine the meshes there, or ask for an accuracy."
+        for (name, count), own in coarse(reduction, solution)
+    )
+
+
+def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, int], np.ndarray]]:
+    """Find the pairs of surfaces whose zone of contact is smaller than the mesh can show.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    list
+        Name and number of contacts of each such pair, with the numbers of those that touch.
+    """
     found = []
-    for view, own in views(reduction, solution):
-        problem, name = view.problem, view.problem.pairs[0].name
-        touching = int(contact_status(problem, own.reactions).touching.sum())
+    for (view, own), pair in zip(views(reduction, solution), reduction.problem.pairs):
+        problem = view.problem
+        touching = np.flatnonzero(contact_status(problem, own.reactions).touching)
         images = 2 ** int(np.sum(problem.chart.mirrored))
         strip = 2 * FEWEST if problem.dim == 2 else np.pi * FEWEST**2
-        if 0 < touching < problem.contacts and touching * images < strip:
-            found.append(
-                f"too few contacts of '{name}' touch, {touching} of {problem.contacts}, to show how the pressure is distributed: "
-                "refine the meshes there, or ask for an accuracy."
-            )
-    return tuple(found)
+        if 0 < len(touching) < problem.contacts and len(touching) * images < strip:
+            found.append(((pair.name, problem.contacts), touching + pair.start))
+    return found
