@@ -27,8 +27,9 @@ from contactopt.analysis.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, 
 from contactopt.analysis.paths import solve_states
 from contactopt.analysis.quantities import Reading
 from contactopt.analysis.solve_scene import Options, Solved
+from contactopt.bodies.elements import is_curved
 from contactopt.bodies.refinement import split_scene
-from contactopt.scenes.scene import Scene
+from contactopt.scenes.scene import Part, Scene
 
 EDGES = ("width", "stick")
 
@@ -94,6 +95,8 @@ class Everywhere:
         self.name, self.best = quantity, best_order(quantity, scene.degree)
         self.usual = MOST_UNKNOWNS[scene.dim]
         self.first = max(FIRST[scene.dim], scene.elements // BELOW)
+        made = [part.build_mesh(self.first, scene.zone) for part in scene.parts if isinstance(part, Part)]
+        self.halved = scene.dim == 2 and not any(is_curved(mesh) for mesh in made)  # what split() can halve
         self.values: dict[tuple[int, int], float] = {}
         self.unknowns: dict[tuple[int, int], int] = {}
         self.changes: list[float] = []
@@ -144,8 +147,7 @@ class Everywhere:
     @property
     def ready(self) -> bool:
         """Whether enough is known for the target to count as reached."""
-        wanted = self.states[-1].dim == 2
-        return not self.jobs and len(self.meshes) > 2 and (not wanted or bool(self.changes))
+        return not self.jobs and len(self.meshes) > 2 and (not self.halved or bool(self.changes))
 
     def facts(self, solved: Solved) -> dict[str, object]:
         """What a Level says of the mesh that is solved next to be judged."""
@@ -162,7 +164,7 @@ class Everywhere:
         if not self.jobs:
             n, s = self.finest, self.splits + 1
             fine = abs(judged.grading) > max(abs(judged.mesh), reading.uncertainty)
-            many = len(self.meshes) > 2 and self.states[-1].dim == 2
+            many = len(self.meshes) > 2 and self.halved
             if many and (not self.changes or (fine and not unresolved)) and 2**s * self.first <= n:
                 jobs = [(n, i) for i in range(1, s + 1)]
                 self.jobs = [job for job in jobs if job not in self.values]

@@ -11,17 +11,17 @@ from contactopt.accuracy.everywhere import best_order, mesh_error, stuck
 from contactopt.accuracy.indicators import ElementErrors, element_errors
 from contactopt.accuracy.marking import (
     at_contacts,
-    balanced,
     check_refinable,
     finer,
     joined,
     otherwise,
+    plateau,
     simplicial,
     unknowns,
     with_bent_edges,
 )
 from contactopt.analysis.paths import solve_states
-from contactopt.analysis.quantities import Peak, Reading
+from contactopt.analysis.quantities import Peak, Reading, nodal_pressure
 from contactopt.analysis.solve_scene import Options, Solved, solve_scene
 from contactopt.derivatives.outputs import Quantity
 from contactopt.scenes.scene import Scene
@@ -111,14 +111,17 @@ class Locally:
             chosen = list(rivals)
             if reading.uncertainty > 0.5 * judged.size:
                 chosen += reading.peaks[:1]
-            near = np.concatenate([contacts, *(peak.contacts for peak in chosen)]).astype(int)
-            marks = [self.errors.marked(SHARE), at_contacts(reduction, near)]
+            near = [contacts, *(peak.contacts for peak in chosen)]
+            if rivals:
+                pressure = nodal_pressure(reduction.problem, self.last.solution)
+                near.append(plateau(reduction, pressure, rivals))
+            marks = [self.errors.marked(SHARE), at_contacts(reduction, np.concatenate(near).astype(int))]
             for peak in chosen:
                 if peak.body >= 0:
                     none = np.empty(0, dtype=int)
                     bodies = range(len(reduction.bodies))
                     marks.append(tuple(peak.elements if i == peak.body else none for i in bodies))
-            marked = balanced(self.states[-1], joined(*marks))
+            marked = joined(*marks)
         self.states = [finer(scene, marked, self.shapes) for scene in self.states]
         return float(unknowns(self.states[-1]))
 
@@ -132,12 +135,15 @@ class Locally:
         before
             The states on that mesh.
         """
-        doubtful = self.shapes.doubtful
-        if not doubtful:
+        if not self.shapes.names:
             return 0.0, ""
+        sentence = (
+            f"the mesh gives boundary {self.shapes.names} by straight edges only, which are taken for chords of a smooth "
+            "line: give its `curve`, or a mesh of second order"
+        )
+        if not self.shapes.doubtful:
+            return 0.0, sentence
         solved = self._solved([otherwise(scene, self.shapes) for scene in before])
-        named = ", ".join(f"'{name}' of body '{body}'" for body, name in doubtful[:3])
-        sentence = f"the mesh gives boundary {named} by straight edges only: give its `curve`, or a mesh of second order"
         if not solved.solution.solved:
             return np.inf, sentence
         other = self.quantity.read(solved.reduction, solved.solution).value

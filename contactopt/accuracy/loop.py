@@ -198,14 +198,17 @@ class _Loop:
             return [], 0.0
         found, excess = [], 0.0
         for peak in last[1:]:
-            doubt = max(peak.uncertainty, self._change(peak))
+            doubt = self._change(peak)
             if peak.value + doubt >= last[0].value - last[0].uncertainty:
                 found.append(peak)
                 excess = max(excess, peak.value + doubt - last[0].value)
         return found, excess
 
     def _change(self, peak: Peak) -> float:
-        """By how much the nearest peak on the last mesh whose elements were larger there differed, or half the value."""
+        """By how much the nearest peak on the last mesh whose elements were larger there differed, or half the value.
+
+        What nodes scatter about a fit is no measure here: where facets change their length, it is large on every mesh.
+        """
         for earlier in reversed(self.peaks[:-1]):
             larger = [one for one in earlier if one.size >= WATCHED * peak.size]
             if larger:
@@ -255,10 +258,10 @@ class _Loop:
         known = last.error is not None and not self.vain and np.isfinite(geometry)
         error = last.error + geometry / scale if known and last.error is not None else None
         reached = self.reached and error is not None and error <= self.accuracy
-        if sentence and geometry > 0:
-            part = f"{geometry / scale:.1e} of the error is that of the geometry" if known else "the geometry is unknown"
+        if sentence:
             start = message if reached or not self.reached else "the geometry keeps the target out of reach"
-            message = f"{start}; {part}, since {sentence}"
+            part = f"{geometry / scale:.1e} of the error is that of the geometry, since " if geometry > 0 else ""
+            message = f"{start}; {part}{sentence}"
         seconds = Counter(self.solved.solution.seconds)
         own = sum(seconds.values())
         seconds["coarse"] += max(last.seconds - own, 0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from contactopt.accuracy.polygon import Chords, chords_of, flatter
+from contactopt.analysis.quantities import Peak
 from contactopt.bodies.elements import is_curved, straight
 from contactopt.bodies.local_refinement import Curve, bent, boundary_curve, divide, simplices
 from contactopt.errors import InputError
@@ -19,6 +20,7 @@ from contactopt.scenes.scene import Part, Rigid, Scene
 
 FIRST = 4  # elements across the contact half-width of a first mesh that the scene itself makes
 RATIO = 1.6  # by how much longer facets may be than those of the other body that face them
+ROUNDS = 6  # of divisions that keep facing facets about as long as each other
 SAMPLES = {2: 32, 3: 8}  # parts of a facet's edge at whose ends a gap function is sampled
 CLOSURE = 0.05  # share of the closure by which a sampled gap may fall below the one between nodes
 
@@ -35,14 +37,16 @@ class Shapes:
     guessed: Mapping[str, Mapping[str, Chords]]
 
     @property
-    def doubtful(self) -> list[tuple[str, str]]:
-        """(body, boundary) where the guess may be wrong."""
-        return [
-            (body, name)
-            for body, found in self.guessed.items()
-            for name, (_, _, doubt) in found.items()
-            if np.any(doubt > 0)
-        ]
+    def names(self) -> str:
+        """The guessed boundaries in words."""
+        found = [f"'{name}' of body '{body}'" for body, own in self.guessed.items() for name in own]
+        return ", ".join(found[:3]) + (" and more" if len(found) > 3 else "")
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether a guess may be wrong."""
+        chords = [own for found in self.guessed.values() for own in found.values()]
+        return any(bool(np.any(doubt > 0)) for _, _, doubt in chords)
 
     def of(self, part: Any) -> Mapping[str, Curve]:
         return self.curves.get(part.name, {})
@@ -119,15 +123,31 @@ def _flattened(curve: Curve, chords: Chords, points: np.ndarray) -> np.ndarray:
 
 
 def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -> Scene:
-    """The scene with the marked elements of every body divided; with all of them where nothing is said."""
-    numbers = iter(marked if marked is not None else ())
+    """The scene with the marked elements of every body divided; with all of them where nothing is said.
+
+    Facets that face much finer ones of another body are divided with them (`balanced`), until none is left.
+    """
+    if marked is None:
+        marked = tuple(
+            np.arange(part.mesh.nelements if isinstance(part, Part) else 0) for part in scene.parts
+        )
+    for _ in range(ROUNDS):
+        marked = balanced(scene, marked)
+        if not any(len(elements) for elements in marked):
+            break
+        scene = _divided(scene, marked, shapes)
+        marked = tuple(np.empty(0, dtype=int) for _ in scene.parts)
+    return scene
+
+
+def _divided(scene: Scene, marked: tuple[np.ndarray, ...], shapes: Shapes) -> Scene:
+    numbers = iter(marked)
 
     def divided(part: Any) -> Any:
-        elements = next(numbers) if marked is not None else None
-        if not isinstance(part, Part) or (elements is not None and not len(elements)):
+        elements = next(numbers)
+        if not isinstance(part, Part) or not len(elements):
             return part
-        chosen = np.arange(part.mesh.nelements) if elements is None else elements
-        return replace(part, mesh=divide(part.mesh, chosen, shapes.of(part)))
+        return replace(part, mesh=divide(part.mesh, elements, shapes.of(part)))
 
     return scene.with_parts(divided)
 
@@ -206,6 +226,20 @@ def at_contacts(reduction: Reduction, contacts: np.ndarray) -> tuple[np.ndarray,
     return tuple(
         np.flatnonzero(body.on_elements(force)) for body, force in zip(reduction.bodies, made)
     )
+
+
+def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -> np.ndarray:
+    """Numbers of the contacts that press at least as much as the least of some peaks on their own pair of surfaces.
+
+    Where many peaks come close to the largest one, the pressure is nearly even: its surface is then divided as one, since
+    facets of different lengths would make peaks of their own.
+    """
+    found = [np.empty(0, dtype=int)]
+    for pair in reduction.problem.pairs:
+        own = [one.value for one in peaks if len(one.contacts) and pair.start <= one.contacts[0] < pair.stop]
+        if own:
+            found.append(np.flatnonzero(pressure[pair.contacts] >= min(own)) + pair.start)
+    return np.concatenate(found)
 
 
 def joined(*marks: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:

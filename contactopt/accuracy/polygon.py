@@ -19,6 +19,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 Chords = tuple[np.ndarray, np.ndarray, np.ndarray]  # begin, end (2, f) and sagitta in doubt (f,) [length]
+SAME = 1e-3  # relative difference of curvatures that rounding of files makes
 NEAREST = 8  # edges among which that of a point is looked for
 
 
@@ -50,7 +51,9 @@ def chords_of(mesh: Any, name: str) -> Chords:
     product = np.prod([np.linalg.norm(side, axis=0) for side in (u, v, c - a)], axis=0)
     curvature[nodes[inner]] = np.abs(2 * area) / product  # that of the circle through three nodes
     begin, end = points[:, edges[0]], points[:, edges[1]]
-    apart = np.abs(curvature[edges[0]] - curvature[edges[1]]) / 2
+    ends = curvature[edges]
+    apart = np.ptp(ends, axis=0) / 2
+    apart[apart <= SAME * ends.max(axis=0)] = 0.0
     return begin, end, np.nan_to_num(apart) * np.sum((end - begin) ** 2, axis=0) / 8
 
 
