@@ -25,6 +25,7 @@ from contactopt.bodies.elements import straight
 from contactopt.bodies.local_refinement import CORNER, simplices
 
 HALVED = 1.8  # by how much smaller elements must be for a level to count as the next one
+TRIED = 3  # meshes before a largest stress at a corner is taken for infinite
 RISE = 1.1  # by how much a stress at a corner has grown since the coarsest elements there
 STEADY = 0.8, 1.7  # share of the growth before that the next growth of a singular stress is
 GROWTHS = 4  # one after the other, that are steady; a sharp rounding looks like a corner before it is resolved
@@ -52,7 +53,7 @@ def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
         what = "stress"
         mesh = straight(solved.reduction.bodies[peak.body].body.basis.mesh)
         vertex = int(np.argmin(np.linalg.norm(mesh.p - peak.place[:, None], axis=0)))
-        if re_entrant(mesh, vertex) and _rises(levels):
+        if len(levels) > TRIED and re_entrant(mesh, vertex) and _rises(levels):
             return f"the largest stress is at the re-entrant corner near ({place}), where it is infinite; no mesh bounds it"
     if _grows(levels, GROWTHS):
         return f"the largest {what}, at ({place}), grows with every refinement like an infinite one; no mesh bounds it"

@@ -23,6 +23,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactopt.accuracy.estimate import Judged, Level
+from contactopt.accuracy.indicators import EDGES
 from contactopt.analysis.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
 from contactopt.analysis.paths import solve_states
 from contactopt.analysis.quantities import Reading
@@ -31,12 +32,10 @@ from contactopt.bodies.elements import is_curved
 from contactopt.bodies.refinement import split_scene
 from contactopt.scenes.scene import Part, Scene
 
-EDGES = ("width", "stick")
-
 
 def best_order(quantity: str, degree: int) -> int:
     """The highest order of convergence that is believed of a quantity."""
-    return 2 if quantity.partition(":")[0] in EDGES else 2 * degree
+    return 2 if quantity.startswith(EDGES) else 2 * degree
 
 
 def remainder(before: float | None, last: float, best: float) -> tuple[float, float | None]:
@@ -175,9 +174,8 @@ class Everywhere:
     def _unknowns(self, elements: int, splits: int) -> float:
         """How many unknowns a mesh will have, by the growth of those before it."""
         known = self.unknowns
-        share = known[self.first * 4, 1] / known[self.first * 4, 0] if (self.first * 4, 1) in known else 1.0
-        if splits:
-            return known[elements, 0] * share**splits
+        if splits and (elements // 2**splits, 0) in known:
+            return float(known[elements // 2**splits, 0] * 4**splits)
         own = [known[n, 0] for n in sorted(n for n, s in known if s == 0)]
         growth = own[-1] / own[-2] if len(own) > 1 else 2.0 ** self.states[-1].dim
         return float(own[-1] * growth)

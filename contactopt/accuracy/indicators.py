@@ -16,6 +16,7 @@ from contactopt.interface.reduction import Reduction
 
 log = logging.getLogger(__name__)
 ENERGY = "energy"
+EDGES = "width", "stick"  # read from so many forces that their slopes cost more than a finer mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +64,7 @@ def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementE
     ----------
     solved : a scene that was reduced and solved
     quantity : of the scene. For "energy" no adjoint is needed: the energy of the error itself is taken, without a sign.
-        The same serves, as a guide to the marking alone, where the adjoint problem has no solution
+        The same serves, as a guide to the marking alone, for edges and where the adjoint problem has no solution
     value : of the quantity
 
     Returns
@@ -73,7 +74,7 @@ def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementE
     step = Step(solved.reduction, solved.reduction.problem, solved.solution)
     bodies, displaced = solved.reduction.bodies, step.displaced
     found = None
-    if quantity.name != ENERGY:
+    if quantity.name != ENERGY and not quantity.name.startswith(EDGES):
         try:
             seeds = quantity.slopes(step)
             dual = step.sensitivity.adjoint(

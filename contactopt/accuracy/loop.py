@@ -172,7 +172,8 @@ class _Loop:
     def _stop(self) -> str:
         """One sentence that says that the target is reached or out of reach, or an empty text."""
         vain = unbounded(self.solved, self.reading, self.levels) if self.solved else ""
-        vain = vain or self.search.vain()
+        if not vain and not len(self.unresolved):
+            vain = self.search.vain()
         if self.reading.missing and len(self.levels) > 2:
             vain = self.reading.missing
         error = self.levels[-1].error

@@ -201,7 +201,7 @@ def _fitted_top(
     value = max(value, _stationary(fit, powers, len(places)) or 0.0) if not _outermost(offset[:, near]) else nodal
     scatter = float(np.sqrt(np.sum(left**2) / (len(near) - len(powers))))
     at_top = abs(float(fit[0]) - nodal**2) if usable[top] else 0.0
-    return value, (scatter + at_top) / (value or 1.0), own, size
+    return value, max(scatter, at_top) / (2 * value or 1.0), own, size
 
 
 def _stationary(fit: np.ndarray, powers: list[tuple[int, int]], dim: int) -> float | None:
