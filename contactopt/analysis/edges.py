@@ -143,12 +143,13 @@ def stick_edge(
     Returns
     -------
     tuple
-        The half-width and its uncertainty [length]; both are 0 without stick.
+        The half-width and its uncertainty [length].
     """
     status = contact_status(problem, reactions)
     contact, uncertain = contact_zone(scene, problem, reactions)
-    if not status.stick.any():
-        return 0.0, 0.0
+    if not status.stick.any():  # or on less than what belongs to one contact
+        least = problem.areas[problem.law.rough & status.touching]
+        return 0.0, equivalent_half_width(scene, float(least.max(initial=0.0)))
     if not status.slip.any():
         return contact, uncertain
     bound, r_t = problem.law.bound(reactions[:, 0]), reactions[:, 1:]
