@@ -12,7 +12,8 @@ from contactopt.accuracy.everywhere import remainder
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.quantities import READINGS, Reading, at_rim, peak_pressure, value_of
 from contactopt.analysis.zone import solve_zone
-from contactopt.bodies.refinement import split
+from contactopt.bodies.local_refinement import split
+from contactopt.bodies.refinement import split_scene
 from contactopt.derivatives.outputs import ROWS, Quantity
 from contactopt.interface.reduction import reduce_bodies
 from contactopt.material import Material
@@ -52,8 +53,7 @@ def test_the_remainder_does_not_trust_luck():
 
 def test_split_keeps_boundaries_and_puts_nodes_on_the_arc():
     sphere = scenes.sphere()
-    coarse = sphere.upper.mesh(8, 20.0)
-    fine = split(coarse, "contact")
+    coarse, fine = (scene.upper.build_mesh(8, 20.0) for scene in (sphere, split_scene(sphere, 8, 1)))
     assert fine.nelements == 4 * coarse.nelements
     assert set(fine.boundaries) == set(coarse.boundaries)
     nodes = np.unique(fine.facets[:, fine.boundaries["contact"]])
@@ -65,7 +65,7 @@ def test_split_keeps_boundaries_and_puts_nodes_on_the_arc():
 
 def test_split_of_a_flat_mesh_stays_flat():
     mesh = MeshQuad().with_boundaries({"contact": lambda x: x[1] == 0}).refined(2)
-    fine = split(mesh, "contact")
+    fine = split(mesh, {})
     assert np.ptp(fine.p[1, np.unique(fine.facets[:, fine.boundaries["contact"]])]) == 0
 
 

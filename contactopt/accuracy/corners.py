@@ -22,7 +22,8 @@ from contactopt.analysis.quantities import Peak, Reading, at_rim
 from contactopt.analysis.resultants import views
 from contactopt.analysis.solve_scene import Solved
 from contactopt.bodies.elements import straight
-from contactopt.bodies.local_refinement import CORNER, simplices
+from contactopt.bodies.curves import CORNER
+from contactopt.bodies.local_refinement import simplices
 
 HALVED = 1.8  # by how much smaller elements must be for a level to count as the next one
 TRIED = 3  # meshes before a largest stress at a corner is taken for infinite

@@ -12,11 +12,11 @@ from contactopt.accuracy.indicators import ElementErrors, element_errors
 from contactopt.accuracy.marking import (
     at_contacts,
     check_refinable,
+    divisible,
     finer,
     joined,
     otherwise,
     plateau,
-    simplicial,
     unknowns,
     with_bent_edges,
 )
@@ -43,7 +43,7 @@ class Locally:
         self, states: tuple[Scene, ...], quantity: Quantity, options: Options, whole: bool
     ):
         check_refinable(states[-1])
-        made = [simplicial(scene) for scene in states]
+        made = [divisible(scene, not whole) for scene in states]
         self.states, self.shapes = [scene for scene, _ in made], made[-1][1]
         self.quantity, self.options, self.whole = quantity, options, whole
         self.best = best_order(quantity.name, states[-1].degree)

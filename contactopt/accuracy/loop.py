@@ -43,7 +43,7 @@ def refine(
     """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
 
     Meshes are refined everywhere, or with `adaptive` where the quantity needs it, each body by itself; a mortar coupling
-    joins what no longer matches. Meshes that are given, and all adaptive ones, become triangles or tetrahedra. Each solve
+    joins what no longer matches, and quadrilaterals and hexahedra become triangles and tetrahedra. Each solve
     begins with the last answer. The search ends short of the target, with a sentence in the estimate, where the quantity
     does not converge or does not exist, where the next mesh would pass a limit, and where a solve or a refinement fails.
 

@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 from contactopt.accuracy.polygon import Chords, chords_of, flatter
 from contactopt.analysis.quantities import Peak
 from contactopt.bodies.elements import is_curved, straight
-from contactopt.bodies.local_refinement import Curve, bent, boundary_curve, divide, simplices
+from contactopt.bodies.local_refinement import Curve, bent, divide, facets_of, simplices, split
+from contactopt.bodies.refinement import part_curves
 from contactopt.errors import InputError
 from contactopt.interface.reduction import Reduction
 from contactopt.scenes.scene import Part, Rigid, Scene
@@ -39,7 +40,7 @@ class Shapes:
     @property
     def names(self) -> str:
         """The guessed boundaries in words."""
-        found = [f"'{name}' of body '{body}'" for body, own in self.guessed.items() for name in own]
+        found = [f"'{name}' of body '{body}'" for body, own in self.guessed.items() for name in own if name]
         return ", ".join(found[:3]) + (" and more" if len(found) > 3 else "")
 
     @property
@@ -52,17 +53,18 @@ class Shapes:
         return self.curves.get(part.name, {})
 
 
-def simplicial(scene: Scene) -> tuple[Scene, Shapes]:
-    """Put a scene on meshes of triangles or tetrahedra, and find the curves of their boundaries.
+def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
+    """Put a scene on meshes of straight elements, and find the curves of their boundaries.
 
     A boundary follows the `curve` of its part or the edges of second order of its file. Without them the curve is a
-    guess: for a contact boundary the smooth line through the nodes of the first mesh, for others the circle on
-    which these lie.
+    guess, the smooth outline through the nodes of the first mesh (contactopt.bodies.curves).
 
     Parameters
     ----------
     scene
         The scene, whose mesh functions make coarse first meshes.
+    simplicial
+        Whether quadrilaterals and hexahedra are cut into triangles and tetrahedra.
 
     Returns
     -------
@@ -76,21 +78,14 @@ def simplicial(scene: Scene) -> tuple[Scene, Shapes]:
         if not isinstance(part, Part):
             return part
         given = part.build_mesh(FIRST, scene.zone)
-        surfaces, cut = scene.surfaces_of(part), simplices(given)
-        names = given.boundaries or {}
-        second = set(names) if is_curved(given) else set()
-        found: dict[str, Curve] = {}
-        guessed[part.name] = {}
-        for name in names:
-            line = part.curve_of(name)
-            if line is None:
-                line = boundary_curve(given, name, arcs=name not in {*surfaces, *second})
-                if line is not None and not getattr(line, "known", name in second):
-                    guessed[part.name][name] = chords_of(cut, name)
-            if line is not None:
-                found[name] = line
-        curves[part.name] = found
-        own = {name: found[name] for name in surfaces if name in found}
+        corners = straight(given) if is_curved(given) else given
+        cut = simplices(corners) if simplicial else corners
+        found = curves[part.name] = part_curves(part, given)
+        unsure = [name for name, curve in found.items() if not getattr(curve, "known", False)]
+        guessed[part.name] = {
+            name: chords_of(cut, facets_of(cut, name)) for name in unsure if scene.dim == 2
+        }
+        own = {name: found[name] for name in scene.surfaces_of(part) if name in found}
         return replace(part, mesh=cut, curve=own or None)
 
     return scene.with_parts(prepared), Shapes(curves, guessed)
@@ -109,7 +104,7 @@ def otherwise(scene: Scene, shapes: Shapes) -> Scene:
     def moved(part: Part) -> Any:
         points, curves = part.mesh.p.copy(), dict(shapes.of(part))
         for name, chords in shapes.guessed.get(part.name, {}).items():
-            nodes = np.unique(part.mesh.facets[:, part.mesh.boundaries[name]])
+            nodes = np.unique(part.mesh.facets[:, facets_of(part.mesh, name)])
             points[:, nodes] = flatter(points[:, nodes], chords)
             curves[name] = partial(_flattened, curves[name], chords)
         mesh = replace(part.mesh, doflocs=points)
@@ -128,9 +123,7 @@ def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -
     Facets that face much finer ones of another body are divided with them (`balanced`), until none is left.
     """
     if marked is None:
-        marked = tuple(
-            np.arange(part.mesh.nelements if isinstance(part, Part) else 0) for part in scene.parts
-        )
+        return _with_meshes(scene, lambda part: split(part.mesh, shapes.of(part)))
     for _ in range(ROUNDS):
         marked = balanced(scene, marked)
         if not any(len(elements) for elements in marked):

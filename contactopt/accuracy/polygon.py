@@ -23,22 +23,22 @@ SAME = 1e-3  # relative difference of curvatures that rounding of files makes
 NEAREST = 8  # edges among which that of a point is looked for
 
 
-def chords_of(mesh: Any, name: str) -> Chords:
+def chords_of(mesh: Any, facets: np.ndarray) -> Chords:
     """The straight edges of a boundary of a plane mesh, and by how far the middle of each is in doubt.
 
     Parameters
     ----------
     mesh
-        A plane mesh of straight triangles.
-    name
-        One of its boundaries.
+        A plane mesh of straight elements.
+    facets
+        Numbers of the facets of the boundary.
 
     Returns
     -------
     Chords
         Begin and end of every edge, and its doubtful sagitta [length].
     """
-    edges, points = mesh.facets[:, mesh.boundaries[name]], mesh.p
+    edges, points = mesh.facets[:, facets], mesh.p
     count = points.shape[1]
     curvature = np.full(count, np.nan)
     order = np.argsort(edges.ravel(), kind="stable")

@@ -34,6 +34,7 @@ from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.errors import InputError
 from contactopt.problem.operators import Product
+from contactopt.scenes.curves import check_curve
 from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)
@@ -267,7 +268,8 @@ class AssembledElastic:
         places = body.locations[:, nodes]
         curve = self.part.curve_of(name)
         if curve is not None:
-            places = np.asarray(curve(places), dtype=float)
+            check_curve(curve, body.basis.mesh, name)
+            places = curve(places)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False
         kind, facets = body.basis.mesh.refdom.__name__, np.asarray(body.basis.mesh.boundaries[name])

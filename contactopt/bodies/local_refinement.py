@@ -1,8 +1,8 @@
-"""Triangles and tetrahedra divided where they are marked, with named boundaries kept and curved boundaries kept curved.
+"""Meshes divided everywhere or where they are marked, with named boundaries kept and curved boundaries kept curved.
 
-scikit-fem divides the elements, by red, green and blue patterns in the plane and by bisection in space, but forgets the
-named boundaries. Every new boundary facet lies in one old boundary facet, which gives it its names. New nodes then move to
-the surface that the mesh stands for.
+scikit-fem divides the elements: all of them into halves, or marked ones, by red, green and blue patterns in the plane and by
+bisection in space. It forgets the named boundaries. Every new boundary facet lies in one old boundary facet, which gives it its
+names. New nodes then move to the surface that the mesh stands for, which `boundary_curves` finds.
 """
 
 from __future__ import annotations
@@ -18,15 +18,48 @@ import numpy as np
 import skfem
 from scipy.spatial import cKDTree
 
-from contactopt.bodies.elements import is_curved, straight
+from contactopt.bodies.curves import CORNER as CORNER
+from contactopt.bodies.curves import plane_curves
+from contactopt.bodies.elements import CURVED, is_curved, straight
+from contactopt.bodies.facet_surfaces import barycentric, space_curves
+from contactopt.errors import InputError
+from contactopt.scenes.curves import Curve as Curve
+from contactopt.scenes.mesh_repair import volumes
 
 log = logging.getLogger(__name__)
-Curve = Callable[[np.ndarray], np.ndarray]
 NEAREST = 16  # old facets among which the one that holds a new facet is looked for
 FLAT = 0.1  # least share of its volume that an element keeps where its nodes move to a curved boundary
-ROUND = 1e-5  # distance of nodes from a circle, over its radius, within which they lie on it: files round their numbers
 BENT = 0.15  # sagitta of an edge over its length, beyond which the mesh is too coarse for its curve
-CORNER = np.deg2rad(30)  # turn of a polygon between two edges from which on it is a corner of the body
+SMALLEST = 1e-10  # size of an element that is not divided any more, over its distance from the origin or the size of the body
+Function = Callable[[np.ndarray], np.ndarray]
+Curves = Mapping[str, Function | None]  # by the name of the boundary; None where it is flat
+
+
+class TooSmall(InputError):
+    """All marked elements are so small that their halves would have no volume in floating-point numbers."""
+
+
+def boundary_curves(mesh: Any, arcs: bool = False) -> dict[str, Curve | None]:
+    """Find the line or surface that each boundary of a mesh stands for.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh in the plane or in space.
+    arcs
+        Whether only arcs, spheres and cylinders count as curved, where the mesh has straight edges.
+
+    Returns
+    -------
+    dict
+        By the name of the boundary its curve, or None where the boundary is flat. The name '' stands for what has no name.
+    """
+    return plane_curves(mesh, arcs) if len(mesh.p) == 2 else space_curves(mesh, arcs)
+
+
+def boundary_curve(mesh: Any, name: str, arcs: bool = False) -> Curve | None:
+    """Find the line or surface that one boundary of a mesh stands for, as `boundary_curves` finds those of all."""
+    return boundary_curves(mesh, arcs)[name]
 
 
 def simplices(mesh: Any) -> Any:
@@ -51,69 +84,154 @@ def simplices(mesh: Any) -> Any:
     return mesh
 
 
-def divide(mesh: Any, marked: np.ndarray, curves: Mapping[str, Curve]) -> Any:
-    """The mesh with the marked elements divided, and others as far as it takes to stay conforming.
+def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
+    """Divide the marked elements of a mesh, and others as far as it takes to stay conforming.
+
+    Elements that are as small as rounding allows stay whole. A new node stays on its edge where it would turn an element
+    inside out on the curve.
 
     Parameters
     ----------
-    mesh : MeshTri or MeshTet of scikit-fem, with named boundaries
-    marked : numbers of the elements to divide
-    curves : for the names of curved boundaries, a function (dim, k) -> (dim, k) that puts new nodes on the true surface
+    mesh
+        A mesh of straight triangles or tetrahedra, with named boundaries.
+    marked
+        Numbers of the elements to divide.
+    curves
+        For the names of curved boundaries, a function (dim, k) -> (dim, k) that puts new nodes on the true surface. The
+        name '' stands for the boundary that has no name.
 
     Returns
     -------
-    A mesh of the same kind with the same named boundaries.
+    Mesh
+        A mesh of the same kind with the same named boundaries.
+
+    Raises
+    ------
+    TooSmall
+        If none of the marked elements can be divided.
     """
-    nameless = replace(mesh, _boundaries=None)  # scikit-fem would warn that it loses the names
+    marked = np.asarray(marked)
+    corners = mesh.p[:, mesh.t[:, marked]]
+    size = np.ptp(corners, axis=1).max(axis=0)
+    scale = max(np.abs(mesh.p).max(), np.ptp(mesh.p, axis=1).max())
+    large = size > SMALLEST * scale
+    if len(marked) and not large.any():
+        place = ", ".join(f"{x:.6g}" for x in corners[:, :, 0].mean(axis=1))
+        raise TooSmall(f"the elements near ({place}) cannot be divided further: they are as small as rounding allows.")
+    return _refined(mesh, marked[large], curves)
+
+
+def split(mesh: Any, curves: Curves) -> Any:
+    """Halve all elements of a mesh, with new nodes of curved boundaries on their curves.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh of any kind; of second order, its nodes on edges and faces become corners.
+    curves
+        The curves of its boundaries, as for `divide`.
+
+    Returns
+    -------
+    Mesh
+        A mesh of the same kind and order of half the element size, with the same named boundaries.
+    """
+    fine = _refined(straight(mesh), 1, curves, mesh.doflocs if is_curved(mesh) else None)
+    return bent(fine, curves) if is_curved(mesh) else fine
+
+
+def _refined(mesh: Any, how: Any, curves: Curves, places: np.ndarray | None = None) -> Any:
+    """The mesh divided as scikit-fem is told, its new nodes at `places`, if given, and on the curves."""
     with _no_word_of_copies():
-        fine = named_like(mesh, nameless.refined(np.asarray(marked)))
+        fine = named_like(mesh, replace(mesh, _boundaries=None, _subdomains=None).refined(how))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
-    points = fine.p.copy()
-    for name, curve in curves.items():
-        mine = np.intersect1d(new, np.unique(fine.facets[:, fine.boundaries[name]]))
+    points = fine.p.copy() if places is None else places.copy()
+    for name, curve in _present(mesh, curves).items():
+        mine = np.intersect1d(new, np.unique(fine.facets[:, facets_of(fine, name)]))
         if len(mine):
             points[:, mine] = curve(points[:, mine])
-    sizes, moved = _volumes(fine.p, fine.t), _volumes(points, fine.t)
-    if np.any(moved * np.sign(sizes) < FLAT * np.abs(sizes)):
-        log.warning(
-            "new nodes stay on the edges of the mesh: on the curved boundary they would turn elements inside out"
-        )
-        return fine
-    return replace(fine, doflocs=points)
+    return _unfolded(fine, points)
 
 
-def bent(mesh: Any, curves: Mapping[str, Curve]) -> Any:
-    """Bend the edges of a plane mesh of straight triangles along its curved boundaries.
+def facets_of(mesh: Any, name: str) -> np.ndarray:
+    """The numbers of the facets of a boundary; the name '' stands for what has no name."""
+    if name:
+        return np.asarray(mesh.boundaries[name])
+    return np.setdiff1d(mesh.boundary_facets(), np.concatenate([[0][:0], *(mesh.boundaries or {}).values()]))
 
-    Elements and named boundaries keep their numbers. An edge that would leave its chord by more than BENT of its length stays
-    straight; so do solids, and meshes without a curved boundary.
+
+def _present(mesh: Any, curves: Curves) -> dict[str, Function]:
+    """The curves of boundaries that have facets."""
+    return {name: curve for name, curve in curves.items() if curve is not None and len(facets_of(mesh, name))}
+
+
+def _unfolded(mesh: Any, points: np.ndarray) -> Any:
+    """The mesh with its nodes at `points`, but for those that would turn an element inside out."""
+    nodes, before = np.asarray(mesh.dofs.element_dofs if is_curved(mesh) else mesh.t), volumes(mesh)
+    sense, least = np.sign(before[:, -1:]), FLAT * np.abs(before).min(axis=1)
+    points, kept = points.copy(), 0
+    while (bad := (volumes(replace(mesh, doflocs=points)) * sense).min(axis=1) < least).any():
+        back = np.unique(nodes[:, bad])
+        back = back[np.any(points[:, back] != mesh.doflocs[:, back], axis=0)]
+        if not len(back):
+            break
+        points[:, back], kept = mesh.doflocs[:, back], kept + len(back)
+    if kept:
+        log.warning("%d nodes stay off the curved boundary, where they would turn elements inside out", kept)
+    return replace(mesh, doflocs=points)
+
+
+def bent(mesh: Any, curves: Curves) -> Any:
+    """Bend the edges and faces of a mesh of straight elements along its curved boundaries.
+
+    Elements and named boundaries keep their numbers. An edge that would leave its chord by more than BENT of its length,
+    or fold an element, stays straight.
 
     Parameters
     ----------
     mesh
         A scikit-fem mesh.
     curves
-        By the name of a boundary the curve that moves points (2, m) onto it [length].
+        By the name of a boundary the curve that moves points (dim, m) onto it [length].
 
     Returns
     -------
     mesh
-        A mesh of second order, or the same mesh where nothing is bent.
+        A mesh of second order, or the same mesh where there is no curve.
     """
-    known = {name: curve for name, curve in curves.items() if len(mesh.boundaries[name])}
-    if len(mesh.p) != 2 or not known:
+    known = _present(mesh, curves)
+    if not known:
         return mesh
     with _no_word_of_copies():
-        made = skfem.MeshTri2.from_mesh(mesh)
-    points = made.doflocs.copy()
+        made = CURVED[mesh.refdom.__name__].from_mesh(replace(mesh, _boundaries=None, _subdomains=None))
+    shift = np.zeros_like(made.doflocs)
+    plane = len(mesh.p) == 2
+    edges, middle = (mesh.facets, made.dofs.facet_dofs[0]) if plane else (mesh.edges, made.dofs.edge_dofs[0])
     for name, curve in known.items():
-        facets = mesh.boundaries[name]
-        middle = made.dofs.facet_dofs[0, facets]
-        start, end = mesh.p[:, mesh.facets[:, facets]].transpose(1, 0, 2)
-        new = curve((start + end) / 2)
-        near = np.linalg.norm(new - (start + end) / 2, axis=0) <= BENT * np.linalg.norm(end - start, axis=0)
-        points[:, middle[near]] = new[:, near]
-    return replace(made, doflocs=points, _boundaries=mesh.boundaries)
+        facets = facets_of(mesh, name)
+        mine = facets if plane else np.unique(mesh.f2e[:, facets])
+        start, end = mesh.p[:, edges[:, mine]].transpose(1, 0, 2)
+        _shift(shift, middle[mine], (start + end) / 2, np.linalg.norm(end - start, axis=0), curve)
+    if isinstance(mesh, skfem.MeshHex):
+        faces = made.dofs.facet_dofs[0]
+        shift[:, faces] = shift[:, middle[mesh.f2e]].sum(axis=1) / 2
+        for name, curve in known.items():
+            own = facets_of(mesh, name)
+            corners = mesh.p[:, mesh.facets[:, own]]
+            _shift(shift, faces[own], corners.mean(axis=1), np.ptp(corners, axis=1).max(axis=0), curve)
+    local = shift[:, made.dofs.element_dofs]  # the node within follows those around it
+    if isinstance(mesh, skfem.MeshQuad):
+        shift[:, made.dofs.element_dofs[8]] = local[:, 4:8].sum(axis=1) / 2
+    elif isinstance(mesh, skfem.MeshHex):
+        shift[:, made.dofs.element_dofs[26]] = local[:, 20:26].sum(axis=1) / 2 - local[:, 8:20].sum(axis=1) / 4
+    return replace(_unfolded(made, made.doflocs + shift), _boundaries=mesh.boundaries)
+
+
+def _shift(shift: np.ndarray, nodes: np.ndarray, places: np.ndarray, size: np.ndarray, curve: Function) -> None:
+    """Write down how nodes at these places move to a curve, as far as it is near in comparison with the size."""
+    off = curve(places) - places
+    near = np.linalg.norm(off, axis=0) <= BENT * size
+    shift[:, nodes[near]] = off[:, near]
 
 
 @contextmanager
@@ -129,12 +247,6 @@ def _no_word_of_copies() -> Iterator[None]:
         yield
     finally:
         skfem_log.removeFilter(filtered)
-
-
-def _volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """(t,) signed volumes of simplices, times the factorial of the dimension."""
-    edges = points[:, cells[1:]] - points[:, cells[:1]]
-    return np.asarray(np.linalg.det(np.moveaxis(edges, 2, 0)))
 
 
 def named_like(old: Any, new: Any) -> Any:
@@ -161,130 +273,6 @@ def named_like(old: Any, new: Any) -> Any:
     centres = new.p[:, new.facets[:, outer]].mean(axis=1)
     count = min(NEAREST, len(facets))
     near = cKDTree(corners.mean(axis=1).T).query(centres.T, k=count)[1].reshape(len(outer), count)
-    parent = facets[near[np.arange(len(outer)), np.argmin(_outside(corners[:, :, near], centres), axis=1)]]
+    parent = facets[near[np.arange(len(outer)), np.argmin(barycentric(corners[:, :, near], centres)[1], axis=1)]]
     names = {name: outer[np.isin(parent, members)] for name, members in old.boundaries.items()}
     return replace(new, _boundaries={name: np.sort(members).astype(np.int32) for name, members in names.items()})
-
-
-def _outside(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """How far points (dim, f) are from facets with corners (dim, dim, f, c), over the size of the facets: (f, c)."""
-    origin, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
-    offset = points[:, :, None] - origin
-    gram = np.einsum("iafc,ibfc->fcab", edges, edges)
-    weights = np.linalg.solve(gram, np.einsum("iafc,ifc->fca", edges, offset)[..., None])[..., 0]
-    beyond = np.maximum(np.maximum(-weights, 0).max(axis=-1), np.maximum(weights.sum(axis=-1) - 1, 0))
-    height = np.linalg.norm(offset - np.einsum("iafc,fca->ifc", edges, weights), axis=0)
-    return np.asarray(beyond + height / np.sqrt(np.trace(gram, axis1=2, axis2=3)))
-
-
-def boundary_curve(mesh: Any, name: str, arcs: bool = False) -> Curve | None:
-    """Lay a smooth line through the nodes of a plane boundary, by arc length.
-
-    Where the boundary turns by more than CORNER it has a corner, and the pieces between corners are smooth by
-    themselves. A piece whose nodes lie on a circle is an arc of that circle.
-
-    Parameters
-    ----------
-    mesh
-        A scikit-fem mesh.
-    name
-        One of its boundaries.
-    arcs
-        Whether every piece has to be an arc or straight. Otherwise the boundary is taken for the polygon that it is.
-
-    Returns
-    -------
-    callable or None
-        A function that moves points (2, m) to their places on the line (2, m) [length]. None in space, for straight
-        boundaries, and with `arcs` for a polygon.
-
-    """
-    if mesh.p.shape[0] != 2:
-        return None
-    facets, points = mesh.boundaries[name], mesh.p
-    edges = mesh.facets[:, facets]
-    if is_curved(mesh):
-        points, middle = mesh.doflocs, mesh.dofs.facet_dofs[0, facets]
-        edges = np.concatenate([[edges[0], middle], [middle, edges[1]]], axis=1)
-    pieces = [_Piece(points[:, chain]) for chain in _chains(edges, points)]
-    if all(piece.flat for piece in pieces) or (arcs and not all(piece.flat or piece.circle for piece in pieces)):
-        return None
-
-    def curve(points: np.ndarray) -> np.ndarray:
-        found = [piece.place(points) for piece in pieces]
-        closest = np.argmin([distance for _, distance in found], axis=0)
-        return np.asarray(np.stack([place for place, _ in found])[closest, :, np.arange(points.shape[1])].T)
-
-    return curve
-
-
-class _Piece:
-    """A chain of nodes (2, m) between two corners, and the line through them."""
-
-    def __init__(self, nodes: np.ndarray) -> None:
-        steps = np.linalg.norm(np.diff(nodes, axis=1), axis=0)
-        self.nodes, self.arc = nodes, np.concatenate([[0.0], np.cumsum(steps)])
-        turns = np.diff(np.unwrap(np.arctan2(*np.diff(nodes, axis=1)[::-1])))
-        self.flat = nodes.shape[1] < 3 or bool(np.all(np.abs(turns) < 1e-9))
-        closed = nodes.shape[1] > 3 and np.array_equal(nodes[:, 0], nodes[:, -1])
-        from scipy.interpolate import CubicSpline  # a tenth of a second, for curved boundaries only
-
-        self.line = CubicSpline(self.arc, nodes.T, bc_type="periodic" if closed else "not-a-knot")
-        self.circle = None if self.flat else _circle(nodes)
-
-    def place(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The places (2, k) on the line for points near it, and how far (k,) these are from the polygon."""
-        a, edge = self.nodes[:, :-1], np.diff(self.nodes, axis=1)
-        offset = points[:, :, None] - a[:, None]
-        share = np.clip(np.sum(offset * edge[:, None], axis=0) / np.sum(edge**2, axis=0), 0, 1)
-        distance = np.linalg.norm(offset - share * edge[:, None], axis=0)
-        best = np.argmin(distance, axis=1)
-        rows = np.arange(points.shape[1])
-        if self.circle is not None:
-            centre, radius = self.circle
-            away = points - centre[:, None]
-            return centre[:, None] + radius * away / np.linalg.norm(away, axis=0), distance[rows, best]
-        at = self.arc[best] + share[rows, best] * np.diff(self.arc)[best]
-        return np.asarray(self.line(at)).T, distance[rows, best]
-
-
-def _circle(nodes: np.ndarray) -> tuple[np.ndarray, float] | None:
-    """Centre and radius of the circle on which at least four nodes (2, m) lie; None where they do not."""
-    if nodes.shape[1] < 4:
-        return None
-    middle = nodes.mean(axis=1)
-    offset = nodes - middle[:, None]
-    terms = np.column_stack([2 * offset.T, np.ones(nodes.shape[1])])
-    x, y, rest = np.linalg.lstsq(terms, np.sum(offset**2, axis=0), rcond=None)[0]
-    radius = float(np.sqrt(max(rest + x**2 + y**2, 0.0)))
-    off = np.abs(np.hypot(offset[0] - x, offset[1] - y) - radius)
-    return (middle + np.array([x, y]), radius) if np.all(off < ROUND * radius) else None
-
-
-def _chains(edges: np.ndarray, points: np.ndarray) -> list[np.ndarray]:
-    """Edges (2, f) joined to chains of nodes that end at ends and at corners."""
-    neighbours: dict[int, list[int]] = {}
-    for a, b in edges.T.tolist():
-        neighbours.setdefault(a, []).append(b)
-        neighbours.setdefault(b, []).append(a)
-    ends = {node for node, others in neighbours.items() if len(others) != 2 or _turns(points, node, others)}
-    left = {tuple(sorted(edge)) for edge in edges.T.tolist()}
-    chains = []
-    while left:
-        open_ends = [node for edge in left for node in edge if node in ends]
-        chain = [open_ends[0] if open_ends else next(iter(left))[0]]
-        while True:
-            follow = [n for n in neighbours[chain[-1]] if tuple(sorted((chain[-1], n))) in left]
-            if not follow or (len(chain) > 1 and chain[-1] in ends):
-                break
-            left.remove(tuple(sorted((chain[-1], follow[0]))))
-            chain.append(follow[0])
-        chains.append(np.array(chain))
-    return chains
-
-
-def _turns(points: np.ndarray, node: int, others: list[int]) -> bool:
-    """Whether the boundary has a corner at a node between two others."""
-    before, after = points[:, node] - points[:, others[0]], points[:, others[1]] - points[:, node]
-    angle = np.arctan2(before[0] * after[1] - before[1] * after[0], before @ after)
-    return bool(abs(angle) > CORNER)

@@ -1,4 +1,4 @@
-"""Meshes with all elements halved, curved contact boundaries kept curved."""
+"""Scenes whose meshes are halved everywhere, with curved boundaries kept curved."""
 
 from __future__ import annotations
 
@@ -7,53 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.bodies.elements import is_curved
-from contactopt.errors import InputError
+from contactopt.bodies.local_refinement import Curve, Function, boundary_curves, split
 from contactopt.scenes.scene import Part, Scene
 
-
-def split(mesh: Any, *contacts: str) -> Any:
-    """Halve all elements of a plane mesh, with new nodes of curved contact boundaries on cubic splines.
-
-    The spline gives the height over the coordinate along which the boundary extends most, so that partners on
-    two bodies stay partners.
-
-    Parameters
-    ----------
-    mesh
-        A plane scikit-fem mesh with straight elements.
-    contacts
-        Names of its contact boundaries.
-
-    Returns
-    -------
-    Mesh
-        The mesh of half the element size, with the same boundaries.
-
-    Raises
-    ------
-    InputError
-        For meshes of solids (scikit-fem drops their boundaries) and of curved elements.
-    """
-    from scipy.interpolate import CubicSpline
-
-    if is_curved(mesh) or len(mesh.p) > 2:
-        raise InputError(
-            "a given mesh can be refined only if it is plane with straight elements; give the part a function "
-            "(elements, zone) -> mesh instead."
-        )
-    fine = mesh.refined(1)
-    p = fine.p.copy()
-    for contact in contacts:
-        old, new = (np.unique(m.facets[:, m.boundaries[contact]]) for m in (mesh, fine))
-        along = int(np.argmax(np.ptp(mesh.p[:, old], axis=1)))
-        order = old[np.argsort(mesh.p[along, old])]
-        p[1 - along, new] = CubicSpline(mesh.p[along, order], mesh.p[1 - along, order])(p[along, new])
-    return replace(fine, doflocs=p)
+STEPS = 8  # of the iteration that keeps a coordinate
 
 
 def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
     """Put a scene on the meshes made for `elements` and then halved several times.
+
+    New nodes lie on the `curve` of their part, or on the curve that the first mesh stands for.
 
     Parameters
     ----------
@@ -76,10 +39,61 @@ def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
 
         def mesh(_: int, zone: float | None) -> Any:
             made = part.build_mesh(elements, zone)
+            curves: dict[str, Function] = dict(part_curves(part, made))
+            touching = {name: curves[name] for name in scene.surfaces_of(part) if name in curves}
+            if callable(part.mesh):  # what moves first stays where it is on other boundaries of the same curve
+                kept = {name: _kept_partners(curve, made, name) for name, curve in touching.items()}
+                curves = kept | {name: curve for name, curve in curves.items() if name not in kept}
             for _ in range(splits):
-                made = split(made, *scene.surfaces_of(part))
+                made = split(made, curves)
             return made
 
         return replace(part, mesh=mesh)
 
     return scene.with_parts(finer) if splits else scene
+
+
+def part_curves(part: Part, mesh: Any, guess: bool = True) -> dict[str, Curve]:
+    """Find the curves of all curved boundaries of a part.
+
+    Parameters
+    ----------
+    part
+        The part.
+    mesh
+        Its mesh.
+    guess
+        Whether the nodes of a polygon may stand for a smooth curve.
+
+    Returns
+    -------
+    dict
+        By the name of a boundary its curve: the one that the part gives, or that of the mesh. The name '' stands for
+        what has no name.
+    """
+    found = {name: part.curve_of(name) or curve for name, curve in boundary_curves(mesh).items()}
+    return {name: curve for name, curve in found.items() if curve is not None and (guess or curve.known)}
+
+
+def _kept_partners(curve: Curve, mesh: Any, name: str) -> Function:
+    """A curve that leaves points the coordinate along which a boundary extends most, so that nodes of two bodies match.
+
+    Where the boundary turns away from this coordinate by more than 45 degrees the curve stays as it is.
+    """
+    if len(mesh.p) != 2:
+        return curve
+    ends = mesh.p[:, mesh.facets[:, mesh.boundaries[name]]]
+    along = int(np.argmax(np.ptp(ends.reshape(2, -1), axis=1)))
+    edge = np.abs(ends[:, 1] - ends[:, 0])
+    if np.any(edge[1 - along] > edge[along]):
+        return curve
+
+    def place(points: np.ndarray) -> np.ndarray:
+        here = points.copy()
+        for _ in range(STEPS):
+            found = curve(here)
+            here[along] += points[along] - found[along]
+        found[along] = points[along]
+        return found
+
+    return place

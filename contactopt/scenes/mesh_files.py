@@ -76,10 +76,23 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     if count > 1:
         raise InputError(f"mesh file '{path}': the body falls into {count} pieces that share no node; {hint}.")
     corners = np.unique(cells.corners)
-    kept = np.concatenate([corners, np.setdiff1d(cells.nodes, corners)])
+    inner = np.unique(cells.nodes[len(cells.corners) :])
+    both = np.intersect1d(corners, inner)
+    if len(both):
+        element = int(np.argmax(np.any(cells.nodes == both[0], axis=0)))
+        raise InputError(
+            f"mesh file '{path}': a node of {cells.name(element)} is a corner of one element and within an edge of another; "
+            "mesh this place anew."
+        )
+    kept = np.concatenate([corners, inner])
     number = np.full(cells.points.shape[1], -1)
     number[kept] = np.arange(len(kept))
-    mesh = _mesh(cells.kind, cells.points[:, kept], number[cells.nodes])
+    try:
+        mesh = _mesh(cells.kind, cells.points[:, kept], number[cells.nodes])
+    except (IndexError, ValueError) as error:  # there are not as many nodes as edges
+        raise InputError(
+            f"mesh file '{path}': neighbouring elements do not share the nodes within their edges; mesh it anew."
+        ) from error
     check_elements(cells, mesh)
     check_surface(path, mesh)
     mesh = mesh.with_boundaries(_boundaries(mesh, groups, dim, number[merged]))

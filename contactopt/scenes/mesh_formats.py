@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import InputError
+from contactopt.scenes.inp import read_inp
 from contactopt.scenes.msh4 import read_msh4, version
 
 MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
@@ -34,10 +35,14 @@ TAGS = (
     "flac3d:group",
     "netgen:index",
 )
-# formats whose readers end on a file that was cut off; those of others may wait for its end for ever
+# formats whose readers end on a damaged file; those of others, and of binary files, may wait or take memory without bound
 SAFE = ("gmsh", "vtu", "vtk", "abaqus", "xdmf", "medit", "nastran", "med", "netgen", "avsucd")
 PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte
+MEMORY = 4_000_000_000, 50  # bytes that such a reader gets, and more per byte
 CHILD = """import contextlib, pickle, sys, meshio
+with contextlib.suppress(ImportError):  # not on Windows
+    import resource
+    resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[3]), int(sys.argv[3])))
 with contextlib.redirect_stdout(sys.stderr):
     mesh = meshio.read(sys.argv[1], file_format=sys.argv[2])
 pickle.dump(mesh, sys.stdout.buffer)"""
@@ -135,10 +140,10 @@ def _read(path: Path) -> Any:
             f"mesh file '{path}': its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp (Abaqus, CalculiX), ..."
         )
     said = ""
-    stated = version(path) if "gmsh" in formats else None
+    stated, binary = version(path) if "gmsh" in formats else (None, False)
     if stated is not None and stated.partition(".")[0] not in ("2", "4"):
         raise InputError(f"mesh file '{path}' is of version {stated} of Gmsh's format; save it in version 4.1 or 2.2.")
-    for newer in (False, True):  # "4" stands for either
+    for newer in () if binary else (False, True):  # "4" stands for either
         if stated in (("4", "4.1") if newer else ("4", "4.0")):
             with contextlib.suppress(Exception):  # what is wrong with a damaged file is said below
                 return read_msh4(path, newer)
@@ -146,7 +151,10 @@ def _read(path: Path) -> Any:
         printed = io.StringIO()
         try:  # on a damaged file readers raise anything, print what is wrong, and end the process
             with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
-                return meshio.read(path, file_format=name) if name in SAFE else _read_apart(path, name, size)
+                if name == "abaqus":
+                    return read_inp(path)
+                safe = name in SAFE and not binary
+                return meshio.read(path, file_format=name) if safe else _read_apart(path, name, size)
         except (Exception, SystemExit) as error:
             text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
             said = said or " ".join(text.split())[:200] or type(error).__name__
@@ -158,11 +166,13 @@ def _read(path: Path) -> Any:
 
 def _read_apart(path: Path, name: str, size: int) -> Any:
     """The mesh, read by a process that is stopped if it takes too long."""
-    command, patience = [sys.executable, "-c", CHILD, str(path), name], PATIENCE[0] + PATIENCE[1] * size
+    memory, patience = MEMORY[0] + MEMORY[1] * size, PATIENCE[0] + PATIENCE[1] * size
+    command = [sys.executable, "-c", CHILD, str(path), name, str(memory)]
     try:
         done = subprocess.run(command, capture_output=True, timeout=patience, check=False)
     except subprocess.TimeoutExpired as error:
         raise ValueError(f"no end after {patience:.0f} s") from error
     if done.returncode:
-        raise ValueError(done.stderr.decode(errors="replace").strip().splitlines()[-1])
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        raise ValueError(said[-1] if said else f"the reader ended with code {done.returncode}")
     return pickle.loads(done.stdout)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from scipy.spatial import KDTree
 
 from contactopt.errors import InputError
 
-SAME = 1e-6  # nodes this fraction of the smaller element apart are one node
+SAME = 1e-6  # places this fraction of a size apart are one place
+ONE, APART = 1e-4, 1e-3  # nodes are one, or two, if they are less, or more, than this fraction of the shortest edge apart
 FLAT = 1e-10  # an element of less volume, over that of a cube of its size, is degenerate
 CLOSED = 1e-9  # what the normals of a closed surface may sum up to, over its area
 CORNERS = {
@@ -121,26 +123,50 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
     -------
     ndarray
         (n,) numbers of nodes: of each group at one place the first.
+
+    Raises
+    ------
+    InputError
+        If two nodes are so near each other that they may be one or two.
     """
     own = np.arange(cells.points.shape[1])
     used = np.unique(cells.nodes)
-    size = np.linalg.norm(np.ptp(cells.points[:, cells.corners], axis=1), axis=0)
-    smallest = np.full(len(own), np.inf)
-    for row in cells.nodes:
-        np.minimum.at(smallest, row, size)
-    pairs = used[KDTree(cells.points[:, used].T).query_pairs(SAME * size.max(), output_type="ndarray")]
-    apart = np.linalg.norm(cells.points[:, pairs[:, 0]] - cells.points[:, pairs[:, 1]], axis=0)
-    pairs = pairs[apart <= SAME * smallest[pairs].min(axis=1)]
-    if not len(pairs):
+    pairs, distance, edge = _near_pairs(cells, used)
+    same = distance <= ONE * edge
+    unclear = np.flatnonzero(~same & (distance <= APART * edge))
+    if len(unclear):
+        i, j = pairs[unclear[0]]
+        raise InputError(
+            f"mesh file '{cells.path}': nodes {i + 1} and {j + 1}, at ({text(cells.points[:, i])}), are "
+            f"{distance[unclear[0]]:.3g} apart, too far for one node and too near for two; merge such nodes in the file."
+        )
+    if not same.any():
         return own
+    pairs = pairs[same]
     if repair:
-        log.warning("%s: nodes that lie on others are merged with them, the first at (%s); %d pairs",
-                    cells.path, text(cells.points[:, pairs[0, 0]]), len(pairs))  # fmt: skip
+        log.warning("%s: nodes that lie on others are merged with them, the first at (%s); %d pairs, at most %.3g apart",
+                    cells.path, text(cells.points[:, pairs[0, 0]]), len(pairs), distance[same].max())  # fmt: skip
     graph = coo_matrix((np.ones(len(pairs)), pairs.T), (len(own), len(own)))
     label = connected_components(graph, directed=False)[1]
     first = np.full(label.max() + 1, len(own))
     np.minimum.at(first, label, own)
     return np.asarray(first[label])
+
+
+def _near_pairs(cells: Cells, used: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs (m, 2) of nodes nearer than APART of the shortest edge at one of them, how far they are apart, and that edge."""
+    corners = cells.points[:, cells.corners].transpose(1, 0, 2)
+    edge = np.min([np.linalg.norm(a - b, axis=0) for a, b in combinations(corners, 2)], axis=0)
+    shortest = np.full(cells.points.shape[1], np.inf)
+    for row in cells.nodes:
+        np.minimum.at(shortest, row, edge)
+    tree = KDTree(cells.points[:, used].T)
+    crowded = np.flatnonzero(tree.query_ball_point(tree.data, APART * shortest[used], return_length=True) > 1)
+    near = tree.query_ball_point(tree.data[crowded], APART * shortest[used[crowded]])
+    found = {(min(i, j), max(i, j)) for i, others in zip(crowded.tolist(), near) for j in others if i != j}
+    pairs = used[np.array(sorted(found), dtype=int).reshape(-1, 2)]
+    distance = np.linalg.norm(cells.points[:, pairs[:, 0]] - cells.points[:, pairs[:, 1]], axis=0)
+    return pairs, distance, shortest[pairs].min(axis=1)
 
 
 def repaired(cells: Cells, merged: np.ndarray) -> Cells:
@@ -220,9 +246,15 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
     InputError
         With the name of the first element that is wrong.
     """
-    places = np.asarray(mesh.elem().doflocs).T
-    places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
-    volume = np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1))
+    nodes = mesh.doflocs[:, mesh.dofs.element_dofs] if len(cells.nodes) > len(cells.corners) else mesh.p[:, mesh.t]
+    apart = np.abs(nodes.sum(axis=1) - cells.points[:, cells.nodes].sum(axis=1)).max(axis=0)
+    wrong = np.flatnonzero(apart > SAME * np.ptp(nodes, axis=1).max(axis=0))
+    if len(wrong):
+        raise InputError(
+            f"mesh file '{cells.path}': {cells.name(wrong[0])} does not share the nodes within its edges and faces with its "
+            "neighbours; mesh this place anew."
+        )
+    volume = volumes(mesh)
     size = np.linalg.norm(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** len(mesh.p)
     bad = np.flatnonzero((volume * np.sign(volume[:, -1:])).min(axis=1) <= FLAT * size)
     if len(bad):
@@ -235,6 +267,24 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
             f"mesh file '{cells.path}': more than two elements share a facet, one of them is {cells.name(element)}; "
             "elements must not overlap."
         )
+
+
+def volumes(mesh: skfem.Mesh) -> np.ndarray:
+    """Compute the ratio of volumes between elements and their reference.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh with e elements.
+
+    Returns
+    -------
+    ndarray
+        (e, n + 1) ratios with their signs, at the n nodes of each element and at its centre.
+    """
+    places = np.asarray(mesh.elem().doflocs).T
+    places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
+    return np.asarray(np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1)))
 
 
 def check_surface(path: Path, mesh: skfem.Mesh) -> None:
@@ -252,12 +302,49 @@ def check_surface(path: Path, mesh: skfem.Mesh) -> None:
     InputError
         If they do not, because elements overlap.
     """
-    surface = skfem.FacetBasis(mesh, mesh.elem(), facets=mesh.boundary_facets())
-    total = np.abs((np.asarray(surface.normals) * surface.dx).sum(axis=(1, 2))).max()
-    if total > CLOSED * surface.dx.sum():
+    facets = mesh.boundary_facets()
+    areas = _area_vectors(mesh.p[:, outer_corners(mesh, facets)])
+    total = np.abs(areas.sum(axis=1)).max()
+    if total > CLOSED * np.linalg.norm(areas, axis=0).sum():
         raise InputError(
             f"mesh file '{path}': the surface of the body is not closed, its normals sum up to {total:.3g}; elements overlap."
         )
+
+
+def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
+    """Order the corners of facets of the surface such that their normals point outwards.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+    facets
+        (f,) numbers of facets of its surface.
+
+    Returns
+    -------
+    ndarray
+        (c, f) numbers of the corners in their order around each facet; in the plane the body is on their left.
+    """
+    cell = mesh.f2t[0, facets]
+    local = np.argmax(mesh.t2f[:, cell] == facets, axis=0)
+    nodes = mesh.t[np.array(mesh.refdom.facets)[local].T, cell]
+    corners = mesh.p[:, nodes]
+    outwards = corners.mean(axis=1) - mesh.p[:, mesh.t[:, cell]].mean(axis=1)
+    wrong = np.sum(_area_vectors(corners) * outwards, axis=0) < 0
+    nodes[:, wrong] = nodes[::-1, wrong]
+    return np.asarray(nodes)
+
+
+def _area_vectors(corners: np.ndarray) -> np.ndarray:
+    """Area times normal (dim, f) of facets with corners (dim, c, f) in their order, the normal on the right of edges."""
+    if len(corners) == 2:
+        x, y = corners[:, 1] - corners[:, 0]
+        return np.stack([y, -x])
+    first, second = corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]
+    if corners.shape[1] == 3:
+        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.asarray(np.cross(first, second, axis=0) / 2)
 
 
 def _volumes(points: np.ndarray, corners: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 
-def version(path: Path) -> str | None:
+def version(path: Path) -> tuple[str | None, bool]:
     """Read the version that a Gmsh file states.
 
     Parameters
@@ -26,14 +26,14 @@ def version(path: Path) -> str | None:
 
     Returns
     -------
-    str or None
-        The version, such as '4.1'; '4' stands for 4.0. None if it is no file of Gmsh.
+    tuple
+        The version, such as '4.1', where '4' stands for 4.0, or None if it is no file of Gmsh; and whether it is binary.
     """
     with path.open("rb") as file:
         head = file.read(200).decode(errors="replace").split()
     if head[:1] == ["$NOD"]:
-        return "1"
-    return head[1] if len(head) > 2 and head[0] == "$MeshFormat" else None
+        return "1", False
+    return (head[1], head[2] != "0") if len(head) > 2 and head[0] == "$MeshFormat" else (None, False)
 
 
 def read_msh4(path: Path, newer: bool) -> Any:
@@ -63,16 +63,16 @@ def read_msh4(path: Path, newer: bool) -> Any:
     sections = _sections(path)
     groups = _groups(sections.get("Entities", []), _names(sections.get("PhysicalNames", [])), newer)
     tags, points = _nodes(_Numbers(sections["Nodes"]), newer)
-    number = np.full(max(tags, default=0) + 1, -1)
-    number[tags] = np.arange(len(tags))
+    number = {tag: place for place, tag in enumerate(tags)}
     blocks: list[tuple[str, np.ndarray]] = []
     members: list[list[str]] = []
     reader = _Numbers(sections["Elements"])
     for _ in range(reader.head(newer)):
         first, second, kind, count = reader.take(4)
         name = _gmsh_to_meshio_type[kind]
-        rows = reader.take(count * (1 + num_nodes_per_cell[name])).reshape(count, -1)
-        blocks.append((name, _gmsh_to_meshio_order(name, number[rows[:, 1:]])))
+        rows = reader.take(count * (1 + num_nodes_per_cell[name])).reshape(count, -1)[:, 1:]
+        nodes = np.array([number[tag] for tag in rows.ravel().tolist()]).reshape(rows.shape)
+        blocks.append((name, _gmsh_to_meshio_order(name, nodes)))
         members.append(groups.get((first, second) if newer else (second, first), []))
     sets = {
         group: [np.arange(len(nodes) if group in own else 0) for (_, nodes), own in zip(blocks, members)]

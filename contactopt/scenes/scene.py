@@ -16,6 +16,7 @@ from contactopt.checks import check_name, check_number, real_array, short
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.scenes.contact import Contact
+from contactopt.scenes.curves import Curve
 
 MOST_ACROSS = 100_000  # across the contact half-width
 LARGEST_VALUE = 1e100  # of forces, stresses and lengths: the squares of larger ones are no numbers
@@ -111,7 +112,7 @@ class Part:
             if not isinstance(boundary, str):
                 raise InputError(f"body '{self.name}': a boundary is given by its name; got {short(boundary)}.")
 
-    def curve_of(self, boundary: str) -> Callable[[np.ndarray], np.ndarray] | None:
+    def curve_of(self, boundary: str) -> Curve | None:
         """Find the function that puts points of a contact boundary on its surface.
 
         Parameters
@@ -121,12 +122,16 @@ class Part:
 
         Returns
         -------
-        callable or None
+        Curve or None
             A function of points (dim, m) to points (dim, m) [length], if there is one.
         """
         if callable(self.curve):
-            return self.curve if boundary == self.contact else None
-        return (self.curve or {}).get(boundary)
+            found = self.curve if boundary == self.contact else None
+        else:
+            found = (self.curve or {}).get(boundary)
+        if found is None or isinstance(found, Curve):
+            return found
+        return Curve(found, True, f"the curve of boundary {boundary!r} of body '{self.name}'")
 
     def build_mesh(self, elements: int, zone: float | None) -> Any:
         """Make the mesh of the body.

@@ -1,0 +1,78 @@
+"""The smooth line or surface that a boundary of a mesh stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from contactopt.errors import InputError
+
+OFF = 2e-2  # how far a node may be from the curve of its boundary, over the size of its facet
+
+
+class Curve:
+    """A function that moves points onto the line or surface that a boundary stands for.
+
+    Parameters
+    ----------
+    place
+        Function of points (dim, m) [length] that returns their places (dim, m) [length].
+    known
+        Whether the user gave the curve, or the mesh has curved edges that define it. False: it was guessed from
+        the nodes of a polygon.
+    name
+        What messages call it.
+    """
+
+    def __init__(self, place: Callable[[np.ndarray], Any], known: bool, name: str = "the curve") -> None:
+        self.place, self.known, self.name = place, known, name
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Move points (dim, m) to their places (dim, m); InputError where the function fails or gives no numbers."""
+        try:
+            with np.errstate(all="ignore"):
+                found = np.asarray(self.place(points), dtype=float)
+        except Exception as error:  # whatever a user's function raises
+            raise InputError(f"{self.name} failed: {type(error).__name__}: {error}.") from error
+        if found.shape != np.shape(points):
+            raise InputError(
+                f"{self.name} must return an array of the shape of its points, {np.shape(points)}; got {found.shape}."
+            )
+        lost = np.flatnonzero(~np.isfinite(found).all(axis=0))
+        if len(lost):
+            place = ", ".join(f"{x:.6g}" for x in points[:, lost[0]])
+            raise InputError(f"{self.name} gives no numbers for the point ({place}).")
+        return found
+
+
+def check_curve(curve: Curve, mesh: Any, boundary: str) -> None:
+    """Check that the nodes of a boundary lie on its curve.
+
+    Parameters
+    ----------
+    curve
+        The curve of the boundary.
+    mesh
+        A scikit-fem mesh.
+    boundary
+        The name of the boundary.
+
+    Raises
+    ------
+    InputError
+        Where a node is further from the curve than OFF of its facet.
+    """
+    corners = mesh.facets[:, mesh.boundaries[boundary]]
+    places = mesh.p[:, corners]
+    size = np.linalg.norm(np.ptp(places, axis=1), axis=0)
+    moved = curve(places.reshape(len(places), -1)).reshape(places.shape)
+    off = np.linalg.norm(moved - places, axis=0).max(axis=0)
+    if len(size) and np.any(off > OFF * size):
+        worst = int(np.argmax(off / size))
+        at = ", ".join(f"{x:.6g}" for x in places[:, :, worst].mean(axis=1))
+        raise InputError(
+            f"{curve.name} is not that of the mesh: near ({at}) it is {off[worst]:.3g} away from the nodes, where a "
+            f"facet has the size {size[worst]:.3g}; mend its radius, its centre or the unit of the mesh."
+        )
