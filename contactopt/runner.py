@@ -14,7 +14,7 @@ import numpy as np
 
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.paths import PathResult, solve_states
-from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
+from contactopt.analysis.quantities import Reading, approach, pressure_reading, stick_width, width
 from contactopt.analysis.resolution import remarks
 from contactopt.analysis.resultants import mirrors, tables
 from contactopt.analysis.solve_scene import Options, Solved
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from contactopt.scenes.scene_files import SceneFile
 
 Note = Callable[[str], None]
+APART = 0.05  # relative difference of two readings of the largest pressure that is told
 PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work")
 
 
@@ -223,6 +224,8 @@ def run(
     backends = chosen.backends(states[-1].dim)  # refused here, before any work, if one of them cannot be used
     form = _form(choose("Q", Q, "auto"), given.get("preconditioner"))
     options = Options(form, choose("solver", solver, "auto"), chosen, choose("tol", tol, 1e-8), note=note)
+    if team is not None and team.size > 1 and aim is not None and (aim.adaptive or states[-1].given):
+        raise InputError("meshes on several ranks are not refined locally; run on one rank, or without an accuracy.")
     if team is not None:
         idle = team.size - sum(isinstance(part, Part) for part in states[-1].parts)
         if idle > 0:
@@ -384,9 +387,7 @@ def _solve(
         return solved, solved.path, None
     from contactopt.accuracy.loop import refine  # it brings the room of derivatives with it
 
-    solved, estimate = refine(
-        states, aim.quantity, aim.accuracy, options, aim.limits, aim.adaptive
-    )
+    solved, estimate = refine(states, aim.quantity, aim.accuracy, options, aim.limits, aim.adaptive)
     return solved, solved.path, estimate
 
 
@@ -402,6 +403,8 @@ def _summary(
     problem, r = reduction.problem, solution.reactions
     found = tables(reduction, solution)
     single = len(problem.pairs) == 1
+    largest = max(pair["max_pressure"] for pair in found["pairs"].values())
+    peak = pressure_reading(reduction, solution) if single else None
     summary: dict[str, Any] = {
         "scene": reduction.scene.name,
         "kind": reduction.scene.kind,
@@ -421,11 +424,11 @@ def _summary(
         "approach": approach(problem, solution),
         "contact_half_width": width(reduction, solution) if single else None,
         "stick_half_width": stick_width(reduction, solution)[0] if single else None,
-        "max_pressure": max(pair["max_pressure"] for pair in found["pairs"].values()),
-        "pressure": peak_pressure(reduction, solution) if single else None,
+        "max_pressure": largest,
+        "pressure": None if peak is None else peak.value,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
-        "remarks": list(remarks(reduction, solution)),
+        "remarks": [*remarks(reduction, solution), *([] if peak is None else _smoothed(peak, largest))],
         **found,
     }
     if path is not None:
@@ -434,6 +437,16 @@ def _summary(
     if estimate is not None:
         summary["accuracy"] = asdict(estimate)
     return summary
+
+
+def _smoothed(peak: Reading, largest: float) -> list[str]:
+    """One sentence where the largest pressure at a node and the one that is read around it are not the same."""
+    if abs(largest - peak.value) <= APART * abs(largest):
+        return []
+    return [
+        f"the largest pressure at a node is {largest:.4g}, what its neighbours let expect is {peak.value:.4g}, give or take "
+        f"{peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
+    ]
 
 
 @contextmanager

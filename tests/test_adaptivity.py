@@ -15,6 +15,7 @@ from contactopt.bodies.local_refinement import boundary_curve, divide, simplices
 from contactopt.derivatives.outputs import find_quantity
 from contactopt.scenes import make_scene
 
+
 def locally(scene, *arguments, **limits):
     return refine([scene], *arguments, adaptive=True, **limits)
 

@@ -21,8 +21,8 @@ from contactopt.accuracy.estimate import Level
 from contactopt.analysis.quantities import Peak, Reading, at_rim
 from contactopt.analysis.resultants import views
 from contactopt.analysis.solve_scene import Solved
-from contactopt.bodies.elements import straight
 from contactopt.bodies.curves import CORNER
+from contactopt.bodies.elements import straight
 from contactopt.bodies.local_refinement import simplices
 
 HALVED = 1.8  # by how much smaller elements must be for a level to count as the next one
@@ -52,7 +52,8 @@ def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
         what = "pressure"
     else:
         what = "stress"
-        mesh = straight(solved.reduction.bodies[peak.body].body.basis.mesh)
+        body: Any = solved.reduction.bodies[peak.body]  # the stress was read from its elements
+        mesh = straight(body.body.basis.mesh)
         vertex = int(np.argmin(np.linalg.norm(mesh.p - peak.place[:, None], axis=0)))
         if len(levels) > TRIED and re_entrant(mesh, vertex) and _rises(levels):
             return f"the largest stress is at the re-entrant corner near ({place}), where it is infinite; no mesh bounds it"

@@ -19,6 +19,7 @@ Source: Roache (1998), Verification and Validation in Computational Science and 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -76,9 +77,7 @@ def mesh_error(values: Sequence[float], best: float) -> tuple[float, float | Non
 def stuck(values: Sequence[float]) -> bool:
     """Whether every halving of the mesh changes the value by as much as the one before."""
     steps = np.diff(values)
-    return len(steps) > 2 and bool(
-        np.all(steps[-2:] * np.sign(steps[-1]) > 2**-STUCK * np.abs(steps[-3:-1]))
-    )
+    return len(steps) > 2 and bool(np.all(steps[-2:] * np.sign(steps[-1]) > 2**-STUCK * np.abs(steps[-3:-1])))
 
 
 class Everywhere:
@@ -115,9 +114,7 @@ class Everywhere:
     def solve(self) -> Solved:
         """Solve the next mesh."""
         elements, splits = self.jobs[0]
-        self.options.note(
-            f"{elements} elements across the half-width" + (f", {splits} splits" if splits else "")
-        )
+        self.options.note(f"{elements} elements across the half-width" + (f", {splits} splits" if splits else ""))
         states = [split_scene(scene, elements // 2**splits, splits) for scene in self.states]
         return solve_states(states, elements, self.options, self.last)
 
@@ -148,7 +145,7 @@ class Everywhere:
         """Whether enough is known for the target to count as reached."""
         return not self.jobs and len(self.meshes) > 2 and (not self.halved or bool(self.changes))
 
-    def facts(self, solved: Solved) -> dict[str, object]:
+    def facts(self, solved: Solved) -> dict[str, Any]:
         """What a Level says of the mesh that is solved next to be judged."""
         zones, (elements, splits) = solved.zones, self.jobs[0]
         return {

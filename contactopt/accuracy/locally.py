@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -39,9 +40,7 @@ class Locally:
 
     usual = USUAL
 
-    def __init__(
-        self, states: tuple[Scene, ...], quantity: Quantity, options: Options, whole: bool
-    ):
+    def __init__(self, states: tuple[Scene, ...], quantity: Quantity, options: Options, whole: bool):
         check_refinable(states[-1])
         made = [divisible(scene, not whole) for scene in states]
         self.states, self.shapes = [scene for scene, _ in made], made[-1][1]
@@ -88,7 +87,7 @@ class Locally:
         """Whether enough is known for the target to count as reached."""
         return len(self.values) > (2 if self.whole else 1)
 
-    def facts(self, solved: Solved) -> dict[str, object]:
+    def facts(self, solved: Solved) -> dict[str, Any]:
         """What a Level says of the mesh beside its size."""
         return {"elements": self.states[-1].elements, "splits": len(self.values)} if self.whole else {}
 

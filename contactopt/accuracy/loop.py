@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import time
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -82,9 +81,7 @@ def refine(
             f"{quantity!r} is the value at a node of one mesh; ask for the pressure at a place, as in 'pressure@X,Y'."
         )
     if adaptive and len(states) > 1:
-        raise InputError(
-            f"scene '{scene.name}' has a load path, which adaptive refinement does not follow."
-        )
+        raise InputError(f"scene '{scene.name}' has a load path, which adaptive refinement does not follow.")
     options = options or Options()
     search = (
         Locally(tuple(states), asked, options, not adaptive)
@@ -137,9 +134,7 @@ class _Loop:
         if not solved.solution.solved:
             sentence = f"the mesh of {solved.reduction.dofs} unknowns was not solved: {solved.solution.message}"
             if not self.levels:
-                raise InputError(
-                    f"scene '{states[-1].name}': {sentence}; begin with another mesh or load."
-                )
+                raise InputError(f"scene '{states[-1].name}': {sentence}; begin with another mesh or load.")
             return sentence
         reading = self.quantity.read(solved.reduction, solved.solution)
         facts = self.search.facts(solved)
@@ -263,10 +258,9 @@ class _Loop:
             start = message if reached or not self.reached else "the geometry keeps the target out of reach"
             part = f"{geometry / scale:.1e} of the error is that of the geometry, since " if geometry > 0 else ""
             message = f"{start}; {part}{sentence}"
-        seconds = Counter(self.solved.solution.seconds)
-        own = sum(seconds.values())
-        seconds["coarse"] += max(last.seconds - own, 0.0)
-        solution = replace(self.solved.solution, seconds=dict(seconds))
+        seconds = dict(self.solved.solution.seconds)
+        seconds["coarse"] = seconds.get("coarse", 0.0) + max(last.seconds - sum(seconds.values()), 0.0)
+        solution = replace(self.solved.solution, seconds=seconds)
         signed = known and np.isfinite(judged.mesh)
         return replace(self.solved, solution=solution), Estimate(
             self.quantity.name,

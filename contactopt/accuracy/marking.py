@@ -82,9 +82,7 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
         cut = simplices(corners) if simplicial else corners
         found = curves[part.name] = part_curves(part, given)
         unsure = [name for name, curve in found.items() if not getattr(curve, "known", False)]
-        guessed[part.name] = {
-            name: chords_of(cut, facets_of(cut, name)) for name in unsure if scene.dim == 2
-        }
+        guessed[part.name] = {name: chords_of(cut, facets_of(cut, name)) for name in unsure if scene.dim == 2}
         own = {name: found[name] for name in scene.surfaces_of(part) if name in found}
         return replace(part, mesh=cut, curve=own or None)
 
@@ -102,7 +100,7 @@ def otherwise(scene: Scene, shapes: Shapes) -> Scene:
     """The scene with every guessed boundary in its other shape (contactopt.accuracy.polygon), as it is solved."""
 
     def moved(part: Part) -> Any:
-        points, curves = part.mesh.p.copy(), dict(shapes.of(part))
+        points, curves = part.mesh.p.copy(), dict[str, Any](shapes.of(part))
         for name, chords in shapes.guessed.get(part.name, {}).items():
             nodes = np.unique(part.mesh.facets[:, facets_of(part.mesh, name)])
             points[:, nodes] = flatter(points[:, nodes], chords)
@@ -146,9 +144,7 @@ def _divided(scene: Scene, marked: tuple[np.ndarray, ...], shapes: Shapes) -> Sc
 
 
 def _with_meshes(scene: Scene, mesh: Callable[[Part], Any]) -> Scene:
-    return scene.with_parts(
-        lambda part: replace(part, mesh=mesh(part)) if isinstance(part, Part) else part
-    )
+    return scene.with_parts(lambda part: replace(part, mesh=mesh(part)) if isinstance(part, Part) else part)
 
 
 def unknowns(scene: Scene) -> int:
@@ -184,8 +180,8 @@ def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, 
     names = [part.name for part in scene.parts]
     for pair in scene.pairs:
         sides = [names.index(body) for body in pair.bodies]
-        parts = [scene.parts[i] for i in sides]
-        if not all(isinstance(part, Part) for part in parts):
+        parts = [part for part in (scene.parts[i] for i in sides) if isinstance(part, Part)]
+        if len(parts) < 2:
             continue
         faces = [_facets(part, surface or part.contact) for part, surface in zip(parts, pair.surfaces)]
         for one, other in ((0, 1), (1, 0)):
@@ -216,9 +212,7 @@ def at_contacts(reduction: Reduction, contacts: np.ndarray) -> tuple[np.ndarray,
     weights = np.zeros(reduction.problem.q.shape)
     weights[contacts] = 1.0
     made = (np.asarray(abs(B).T @ weights.ravel()) for B in reduction.maps)
-    return tuple(
-        np.flatnonzero(body.on_elements(force)) for body, force in zip(reduction.bodies, made)
-    )
+    return tuple(np.flatnonzero(body.on_elements(force)) for body, force in zip(reduction.bodies, made))
 
 
 def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -> np.ndarray:
@@ -264,15 +258,16 @@ def overlooked(reduction: Reduction, touching: np.ndarray, apart: np.ndarray) ->
     found = [np.empty(0, dtype=int)]
     parts = {part.name: part for part in scene.parts}
     for pair, made, coupling in zip(scene.pairs, problem.pairs, reduction.couplings):
-        rigid = [parts[body] for body in pair.bodies if isinstance(parts[body], Rigid)]
-        cells = coupling.cells
-        if not rigid or not callable(rigid[0].gap) or not np.size(cells):
+        rigid = [part for part in (parts[body] for body in pair.bodies) if isinstance(part, Rigid)]
+        cells = coupling.cells.T
+        gap = rigid[0].gap if rigid else None
+        if not callable(gap) or not np.size(cells):
             continue
         corners = cells[:, : scene.dim]  # of a quadrilateral half
         shares = _lattice(scene.dim)
         own, clear = coupling.gap, np.maximum(apart[made.contacts], 0.0)
         points = np.einsum("sc,dvc->dvs", shares, problem.coordinates[:, made.contacts][:, corners])
-        sampled = np.asarray(rigid[0].gap(points.reshape(scene.dim, -1)), dtype=float).reshape(points.shape[1:])
+        sampled = np.asarray(gap(points.reshape(scene.dim, -1)), dtype=float).reshape(points.shape[1:])
         between = own[corners] @ shares.T
         closure = float(np.ptp(own[touching[made.contacts]])) if touching[made.contacts].any() else 0.0
         bound = clear[corners] @ shares.T + CLOSURE * closure

@@ -76,9 +76,7 @@ def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
     return contact_zone(scene, problem, reactions)[0]
 
 
-def contact_zone(
-    scene: Scene, problem: InterfaceProblem, reactions: np.ndarray
-) -> tuple[float, float]:
+def contact_zone(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> tuple[float, float]:
     """Read the half-width of the contact zone, with its uncertainty.
 
     Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against x^2 over the outer
@@ -201,9 +199,7 @@ def _half_width(
         return coarse  # no disc: the zone reaches the rim of the surface on some sides, or is long
     uncertainty = sum(patch.copies * max(patch.uncertainty, WITHIN * patch.step) for patch in ends)
     if scene.kind == "axisymmetric":  # a ring between two distances from the axis, or a disc
-        squares = (
-            abs(p.last**2 - (p.first**2 if p.first > 0 or p.last < 0 else 0)) for p in ends
-        )
+        squares = (abs(p.last**2 - (p.first**2 if p.first > 0 or p.last < 0 else 0)) for p in ends)
         return float(np.sqrt(sum(squares))), uncertainty
     return sum(patch.copies * (patch.last - patch.first) / 2 for patch in ends), uncertainty
 

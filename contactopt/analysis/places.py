@@ -102,9 +102,7 @@ def place_of(name: Any, scene: Scene) -> Place | None:
     if kind == "pressure" and at:
         pairs = [pair.name for pair in scene.pairs]
         if rest not in pairs and (rest or len(pairs) > 1):
-            raise InputError(
-                f"quantity {name!r}: name one pair of surfaces, as in 'pressure:{pairs[0]}@...'."
-            )
+            raise InputError(f"quantity {name!r}: name one pair of surfaces, as in 'pressure:{pairs[0]}@...'.")
         return Place(name, kind, rest, _around(name, where, scene))
     stress = kind.removeprefix("stress_")
     if kind != LARGEST and stress == kind:
@@ -123,11 +121,12 @@ def place_of(name: Any, scene: Scene) -> Place | None:
         raise InputError(f"quantity {name!r}: a component of the stress is read at a point, as in '{kind}:{body}@1,2'.")
     if boundary and at:
         raise InputError(f"quantity {name!r}: give either a boundary or a point.")
-    _check_there(name, next(part for part in scene.parts if part.name == body), region, scene)
+    part = next(part for part in scene.parts if isinstance(part, Part) and part.name == body)
+    _check_there(part, region, scene)
     return Place(name, kind if kind == LARGEST else stress, body, region)
 
 
-def _check_there(name: str, part: Part, region: Region, scene: Scene) -> None:
+def _check_there(part: Part, region: Region, scene: Scene) -> None:
     """InputError for a boundary that the first mesh of a body does not have, and for a point far outside it."""
     if not region.boundary and not region.point:
         return
@@ -216,9 +215,7 @@ def read_stress(place: Place, reduction: Reduction, displaced: tuple[np.ndarray,
         )
         for i in (top, *others)
     ]
-    return StressReading(
-        float(sizes[top]), uncertainty, tuple(peaks), number, recovered, slopes
-    )
+    return StressReading(float(sizes[top]), uncertainty, tuple(peaks), number, recovered, slopes)
 
 
 def _tops(places: np.ndarray, sizes: np.ndarray) -> list[int]:
@@ -328,8 +325,10 @@ def read_place(place: Place, reduction: Reduction, solution: Solution) -> Readin
         apart = problem.displacements(solution.reactions, solution.multipliers)[near, 0].min()
         missing = f"there is no contact at ({point}): the surfaces are {apart:.3g} apart there"
     share = weights[near, 0] * problem.areas[near]
-    scatter = float(np.abs(pressure - value) @ np.abs(share)) if len(near) < 3 else float(
-        np.sqrt(np.sum(_left(problem.coordinates[:, near], pressure) ** 2) * np.sum(share**2))
+    scatter = (
+        float(np.abs(pressure - value) @ np.abs(share))
+        if len(near) < 3
+        else float(np.sqrt(np.sum(_left(problem.coordinates[:, near], pressure) ** 2) * np.sum(share**2)))
     )
     noise = solution.residual * float(np.linalg.norm(solution.reactions) / problem.areas[near].min())
     at = problem.coordinates[:, near[0]]

@@ -117,9 +117,7 @@ def find_quantity(name: Any, scene: Scene) -> Quantity:
     row = ROWS.get(kind)
     if row is None or (rest and not row[0]):
         if row is not None and kind in READINGS:
-            raise InputError(
-                f"the {kind} belongs to the whole scene; of one pair ask for {', '.join(OF_ONE_PAIR)}."
-            )
+            raise InputError(f"the {kind} belongs to the whole scene; of one pair ask for {', '.join(OF_ONE_PAIR)}.")
         known = ", ".join((*(f"{kind}{form}" for kind, (form, _) in ROWS.items()), *PLACED))
         raise InputError(f"unknown quantity {name!r}; choose from {known}.")
     return row[1](name, rest, scene)
@@ -162,9 +160,7 @@ def _surface(name: str, rest: str, scene: Scene) -> Quantity:
             f"pair, as in '{kind}:{names[0]}', or ask for the energy."
         )
     if rest and rest not in names:
-        raise InputError(
-            f"quantity {name!r}: there is no pair of surfaces {rest!r}; the pairs are {', '.join(names)}."
-        )
+        raise InputError(f"quantity {name!r}: there is no pair of surfaces {rest!r}; the pairs are {', '.join(names)}.")
     number = names.index(rest) if rest else 0
     slopes = _stick if kind == "stick" else partial(_reading, kind)
     return Quantity(name, partial(slopes, pair=number), partial(_read_pair, kind, number))
@@ -174,9 +170,7 @@ def _read_pair(kind: str, number: int, reduction: Reduction, solution: Solution)
     """A reading of one pair of surfaces, with contacts numbered as in the whole scene."""
     first = reduction.problem.pairs[number].start
     found = READINGS[kind](*views(reduction, solution)[number])
-    return replace(
-        found, peaks=tuple(replace(peak, contacts=peak.contacts + first) for peak in found.peaks)
-    )
+    return replace(found, peaks=tuple(replace(peak, contacts=peak.contacts + first) for peak in found.peaks))
 
 
 def _plain(slopes: Callable[[Step], Seeds]) -> Callable[[str, str, Scene], Quantity]:
