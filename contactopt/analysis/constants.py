@@ -23,7 +23,7 @@ COARSEST = 4  # elements across the contact half-width of the first of nested me
 FACTOR = {2: 8, 3: 4}  # coarser than the next of them, where bodies are factorised: a 64th of the unknowns
 ROUGH = 1e-6  # certificate asked of a coarse mesh: its own error is larger
 
-# Refinement (contactopt.analysis.accuracy).
+# Refinement (contactopt.accuracy).
 FIRST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least, by dimension
 BELOW = 8  # by how much fewer than the scene's default they are
 MOST_UNKNOWNS = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: half a minute
