@@ -83,7 +83,7 @@ def test_no_contact_there_is_said():
 @pytest.mark.parametrize("name", ["von_mises:block:topp", "von_mises:blok", "pressure:a-b", "von_mises:block@90,0"])
 def test_misspelt_names_are_told_before_anything_is_solved(name, monkeypatch):
     monkeypatch.setattr(loop, "_Loop", None)
-    with pytest.raises(InputError, match="boundary 'topp'|body 'blok'|surfaces 'a-b'|outside body"):
+    with pytest.raises(InputError, match=r"boundary 'topp'|body 'blok'|surfaces 'a-b'|outside body"):
         refine([pressed(parabola)], name, 0.01)
 
 

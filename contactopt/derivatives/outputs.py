@@ -73,7 +73,7 @@ class Quantity:
     name    as it was asked for
     slopes  step -> Seeds: its value and its derivatives by what a state holds
     reader  (reduction, solution) -> Reading: value, uncertainty, local maxima; None: the value of the slopes
-    nodal   whether it belongs to one mesh, so that it means another thing on the next one
+    nodal   whether it means another thing on the next mesh
     """
 
     name: str
