@@ -7,6 +7,7 @@ import meshio
 import numpy as np
 import pytest
 import skfem
+import skfem.io.meshio
 
 from contactopt import InputError, load_mesh
 from contactopt.scenes import mesh_formats
@@ -297,3 +298,134 @@ def test_boundaries_by_place():
         name_boundaries(mesh, {"roof": {1: (2.0, 2.0)}})
     with pytest.raises(InputError, match="scale"):
         load_mesh("a.msh", scale=-1)
+
+
+TWO_BODIES = """*Heading
+** two bricks, each with its own block of nodes, as CalculiX takes them
+*NODE, NSET=NLOW
+{low}
+*ELEMENT, TYPE=C3D20R, ELSET=LOW
+1,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,
+16,17,18,19,20
+*Node
+{up}
+*Element, type=c3d20r, elset=up
+ 7,101,102,103,104,105,106,107,108,109,110,111,112,113,114,115,
+116,117,118,119,120
+*ELEMENT, TYPE=SPRINGA, ELSET=SPRINGS
+9, 1, 101
+*NSET, NSET=FLOOR
+1, 2, 3, 4,
+*NSET, NSET=RANGE, GENERATE
+5, 8, 1
+*NSET, NSET=BOTH
+FLOOR, range, 101
+*ELSET, ELSET=ALL
+LOW, up
+*SURFACE, NAME=TOUCH
+up, S1
+LOW, S2
+*STEP
+*NODE PRINT, NSET=FLOOR
+U
+*END STEP
+"""
+
+
+def brick_of_twenty(height, first):
+    """Lines of the nodes of a brick of second order, numbered from `first`."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]])
+    edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+    places = np.concatenate([corners, [corners[list(edge)].mean(axis=0) for edge in edges]])
+    return "\n".join(f"{first + i}, {x}, {y}, {z + height}" for i, (x, y, z) in enumerate(places))
+
+
+def test_two_bodies_of_calculix_with_their_own_nodes_sets_and_surfaces(tmp_path):
+    (tmp_path / "nodes.inc").write_text("*NODE\n" + brick_of_twenty(1.0, 101) + "\n")
+    text = TWO_BODIES.format(low=brick_of_twenty(0.0, 1), up=brick_of_twenty(1.0, 101))
+    included = text.replace("*Node\n" + brick_of_twenty(1.0, 101), "*INCLUDE, INPUT=nodes.inc")
+    for content in (text, included):
+        (tmp_path / "two.inp").write_text(content)
+        low, up = load_mesh(tmp_path / "two.inp", "LOW"), load_mesh(tmp_path / "two.inp", "up")
+        for mesh, z in ((low, 0), (up, 1)):
+            assert type(mesh) is skfem.MeshHex2 and volume(mesh) == pytest.approx(1.0)
+            assert (mesh.p[2].min(), mesh.p[2].max()) == (z, z + 1)
+            assert flux(mesh, "TOUCH") == pytest.approx(1 - 2 * z)
+        assert flux(low, "FLOOR") == pytest.approx(0) and flux(low, "RANGE") == pytest.approx(1)
+        assert len(low.boundaries["BOTH"]) == 6 and "FLOOR" not in up.boundaries
+    for old, new, words in (
+        ("101,102", "999,102", "names a node that is not there"),
+        ("16,17,18,19,20\n*Node", "16,17,18,19\n*Node", "cannot be read as abaqus"),
+        ("*Heading", "*INCLUDE, INPUT=two.inp", "include each other"),
+        ("*Heading", "*PART, NAME=A\n*PART, NAME=B", "several parts"),
+    ):
+        (tmp_path / "two.inp").write_text(text.replace(old, new))
+        with pytest.raises(InputError, match=words):
+            load_mesh(tmp_path / "two.inp", "LOW")
+
+
+@pytest.mark.parametrize("kind,count", [("CAX8R", 8), ("CPE4", 4), ("CPS6", 6), ("CAX3", 3)])
+def test_plane_elements_of_calculix(tmp_path, kind, count):
+    corners = [[1, 0], [2, 0], [2, 1], [1, 1]] if count in (4, 8) else [[1, 0], [2, 0], [1, 1]]
+    places = np.array(corners, dtype=float)
+    if count in (6, 8):
+        places = np.concatenate([places, (places + np.roll(places, -1, axis=0)) / 2])
+    lines = [f"{10 * i + 10}, {x}, {y}" for i, (x, y) in enumerate(places)]
+    names = ", ".join(str(10 * i + 10) for i in range(count))
+    text = "\n".join(["*NODE", *lines, f"*ELEMENT, TYPE={kind}", f"3, {names}", "*SURFACE, NAME=LOW", "3, S1"])
+    (tmp_path / "a.inp").write_text(text)
+    mesh = load_mesh(tmp_path / "a.inp")
+    assert volume(mesh) == pytest.approx(1 if count in (4, 8) else 0.5)
+    assert np.all(mesh.p[1, mesh.facets[:, mesh.boundaries["LOW"]]] == 0)
+
+
+@pytest.mark.parametrize("apart,words", [(3e-6, None), (2e-5, "nodes .* too far for one node and too near for two")])
+@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e6])
+def test_a_seam_closes_in_whole_or_is_refused(tmp_path, caplog, unit, apart, words):
+    """Nodes of a seam lie apart by lengths about those at which they are taken for one."""
+    grids = [skfem.MeshQuad.init_tensor(np.linspace(i, i + 1, 21), np.linspace(0, 1, 21)) for i in (0, 1)]
+    moved = grids[1].p + apart * np.random.default_rng(0).uniform(-1, 1, grids[1].p.shape)
+    points = unit * np.pad(np.concatenate([grids[0].p, moved], axis=1).T, [(0, 0), (0, 1)])
+    path = write(tmp_path / "a.vtu", points, [("quad", np.concatenate([grids[0].t, grids[1].t + 441], axis=1).T)])
+    if words:
+        with pytest.raises(InputError, match=words):
+            load_mesh(path)
+    else:
+        assert load_mesh(path).p.shape[1] == 2 * 441 - 21 and "21 pairs, at most" in caplog.text
+
+
+@pytest.mark.parametrize("small", [1e-4, 1e-5])
+def test_fine_facets_of_second_order_far_from_the_origin(tmp_path, small):
+    ticks = np.concatenate([[0], np.geomspace(small, 1, 20)])
+    mesh = skfem.MeshTri2.from_mesh(skfem.MeshTri.init_tensor(ticks, ticks))
+    x, y = mesh.doflocs
+    bent = skfem.MeshTri2(np.stack([x + 0.1 * y**2, y + 0.2 * x * y]) + 3, mesh.t)
+    written = skfem.io.meshio.to_meshio(bent, encode_cell_data=False)
+    found = load_mesh(write(tmp_path / "a.vtu", np.pad(written.points, [(0, 0), (0, 1)]), written.cells))
+    assert found.nelements == 800 and volume(found) == pytest.approx(volume(bent), rel=1e-12)
+
+
+def test_neighbours_that_do_not_share_a_node_within_their_edge_are_refused(tmp_path):
+    points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5], [0.5, 0.5], [0.6, 0.5]])
+    points = np.pad(points, [(0, 0), (0, 1)])
+    for other, words in ((9, "not share the nodes"), (4, "not share the nodes"), (2, "a corner of one element")):
+        cells = [("triangle6", [[0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 6, other]])]
+        with pytest.raises(InputError, match=words):
+            load_mesh(write(tmp_path / "a.vtu", points[:10] if other == 9 else points[:9], cells))
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_damaged_binary_files_of_second_order_end_in_a_sentence(gmsh, tmp_path, version):
+    gmsh.option.setNumber("Mesh.Binary", 1.0)
+    path = disc_in_plate(gmsh, tmp_path / "a.msh", 2, 2, version=version)
+    good, random = path.read_bytes(), np.random.default_rng(int(10 * version))
+    assert load_mesh(path, "disc").boundaries["rim"].size
+    for _ in range(4):
+        data = bytearray(good)
+        for place in random.integers(60, len(data), 4):
+            data[place] = random.integers(256)
+        path.write_bytes(data)
+        try:
+            load_mesh(path, "disc")
+        except InputError as error:
+            assert "\n" not in str(error)

@@ -1,17 +1,19 @@
 """The smooth outline that a plane mesh stands for: straight pieces, arcs, and what is between them.
 
-The outline of a body is a chain of nodes. It is cut at corners; between them runs of nodes on one line are straight, runs on one
-circle are arcs, as far as the rounding of the coordinates allows to say. An edge that belongs to no run turns at its ends into
-the directions of the runs beside it, or of the circle through a node and its two neighbours. So straight pieces stay straight,
-and no edge feels what is beyond its neighbours.
+The outline of a body is a chain of nodes. It is cut at corners; between them runs of nodes on one
+line are straight, runs on one circle are arcs, as far as the rounding of the coordinates allows to
+say. An edge that belongs to no run turns at its ends into the directions of the runs beside it, or
+of the circle through a node and its two neighbours. So straight pieces stay straight, and no edge
+feels what is beyond its neighbours.
 
 Every edge of length c carries the curve
 
     y(s) = (1 - s/c) y_a(s) + s/c y_b(s)        over its chord, 0 <= s <= c,
 
-where y_a and y_b are arcs through both ends, with the curvatures k_a and k_b: an arc if these are the same. The blended arcs lie
-between the two and do not overshoot; neighbours have one tangent in common. Source: Wenz (1996), Interpolation of curve
-data by blended generalized circles, Computer Aided Geometric Design 13.
+where y_a and y_b are arcs through both ends, with the curvatures k_a and k_b: an arc if these are
+the same. The blended arcs lie between the two and do not overshoot; neighbours have one tangent in
+common. Source: Wenz (1996), Interpolation of curve data by blended generalized circles, Computer
+Aided Geometric Design 13.
 
 Edges of second order are cut in halves at the nodes within them, which lie on the outline as well.
 """
@@ -19,6 +21,7 @@ Edges of second order are cut in halves at the nodes within them, which lie on t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,9 +30,16 @@ from scipy.spatial import cKDTree
 from contactopt.bodies.elements import is_curved
 from contactopt.scenes.curves import Curve
 
-CORNER = np.deg2rad(35)  # a polygon that turns by more between two edges has a corner there: three chords make a fillet
-KINK = np.deg2rad(5), 5.0  # a smaller turn is a corner if it is more than this, and times what its neighbours let expect
-STRAIGHT = 1e-9  # a node in the middle of an edge is off the chord by more than this fraction of it, or the edge is straight
+# a polygon that turns by more between two edges has a corner there; three chords make a fillet
+CORNER = np.deg2rad(35)
+LARGEST = np.deg2rad(75)  # unless it is an arc that is tangent to the edges beside it, and turns by less
+ALIKE = 1e-3  # relative difference of their curvatures, and of angles [rad]
+KINK = (
+    np.deg2rad(5),
+    5.0,
+)  # a smaller turn is a corner if it is more than this, and times what its neighbours let expect
+# the middle of an edge is off the chord by more than this fraction of it, or the edge is straight
+STRAIGHT = 1e-9
 EXACT = 1e-9  # of the size of the body: coordinates are not compared more exactly
 DIGITS = range(6, 13)  # decimal digits that files write
 STEEP = np.sin(np.deg2rad(60))  # largest sine of the angle between an edge and its curve
@@ -79,7 +89,8 @@ def shares(mesh: Any, owner: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]
     Yields
     ------
     tuple
-        The name of a boundary, or '' for what has no name; what messages call its curve; and whether each piece is its own.
+        The name of a boundary, or '' for what has no name; what messages call its curve; and
+        whether each piece is its own.
     """
     left = np.ones(len(owner), dtype=bool)
     for name, facets in (mesh.boundaries or {}).items():
@@ -90,7 +101,7 @@ def shares(mesh: Any, owner: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]
 
 
 def _edges(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Edges (2, e) between nodes of the outline, places of the nodes, the facet of each edge, and whether the mesh curves."""
+    """Edges (2, e) of the outline, places of nodes, the facet of each edge, and whether it curves."""
     ends = mesh.facets[:, facets]
     if not is_curved(mesh):
         return ends, mesh.p, facets, False
@@ -103,7 +114,7 @@ def _edges(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 def rounding(points: np.ndarray) -> float:
-    """Find how far nodes (dim, m) may be from where they belong because a file rounds its numbers [length]."""
+    """Find how far nodes (dim, m) may be off because a file rounds its numbers [length]."""
     size, largest = np.ptp(points, axis=1).max(), np.abs(points).max()
     least = max(EXACT * size, 16 * np.finfo(float).eps * largest)
     if np.array_equal(points, points.astype(np.float32)):
@@ -116,7 +127,7 @@ def rounding(points: np.ndarray) -> float:
 
 
 def _chains(edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Edges (2, e) joined to chains: the nodes, the numbers of the edges, and whether each is passed from its first end.
+    """Edges (2, e) joined to chains: nodes, numbers of edges, and whether each runs forward.
 
     A closed chain ends where it begins.
     """
@@ -128,8 +139,8 @@ def _chains(edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]
     left = set(range(len(pairs)))
     starts = [node for node, numbers in at.items() if len(numbers) != 2]
     chains = []
-    for node in [*(node for node in starts for _ in at[node]), *at]:
-        nodes, passed = [node], []
+    for start in [*(node for node in starts for _ in at[node]), *at]:
+        nodes, passed = [start], []
         while True:
             follow = [n for n in at[nodes[-1]] if n in left]
             if not follow or (len(nodes) > 1 and len(at[nodes[-1]]) != 2):
@@ -145,7 +156,7 @@ def _chains(edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _bends(x: np.ndarray, near: float, arcs: bool) -> np.ndarray:
-    """Curvatures (2, n) of a chain of nodes (2, n + 1) at both ends of its edges, positive where it turns left."""
+    """Curvatures (2, n) of a chain of nodes (2, n + 1) at both ends of edges, positive to the left."""
     closed = x.shape[1] > 3 and np.array_equal(x[:, 0], x[:, -1])
     turn, length = _turns(x, closed)
     corner = _corners(turn, length)
@@ -158,14 +169,14 @@ def _bends(x: np.ndarray, near: float, arcs: bool) -> np.ndarray:
             return np.asarray(np.roll(_bends(x[:, np.append(order, first)], near, arcs), first, axis=1))
     runs = np.full(len(length), np.nan)  # the curvature of the run that an edge belongs to
     cuts = np.unique([0, *np.flatnonzero(corner), len(length)])
-    for first, last in zip(cuts[:-1], cuts[1:]):
+    for first, last in pairwise(cuts.tolist()):
         for start, end, bend in _runs(x[:, first : last + 1], near):
             runs[first + start : first + end] = bend
     return _ends(turn, length, corner, runs, closed, arcs)
 
 
 def _turns(x: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Turns (n + 1,) of a chain at its nodes [rad], nan at open ends, and the lengths (n,) of its edges."""
+    """Turns (n + 1,) of a chain at its nodes [rad], nan at open ends, and lengths (n,) of edges."""
     steps = np.diff(x, axis=1)
     length, direction = np.hypot(*steps), np.arctan2(*steps[::-1])
     turn = np.full(x.shape[1], np.nan)
@@ -176,25 +187,54 @@ def _turns(x: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _corners(turn: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """Whether the nodes are corners: where the turn is large, or by far larger than next to it. Open ends are corners."""
+    """Whether nodes are corners: where the turn is large, or far larger than next to it, or ends."""
     spacing = np.concatenate([length[-1:], length, length[:1]])
     span = (spacing[:-1] + spacing[1:]) / 2
     rate = np.where(np.isnan(turn), 0.0, np.abs(turn)) / np.minimum(spacing[:-1], spacing[1:])
     beside = np.concatenate([rate[-2:-1], rate, rate[1:2]])
     expected = np.maximum(beside[:-2], beside[2:]) * span
     kink = (np.abs(turn) > KINK[0]) & (np.abs(turn) > KINK[1] * expected)
-    return np.asarray(np.isnan(turn) | (np.abs(turn) > CORNER) | kink)
+    return np.isnan(turn) | (~_on_fillet(turn, length) & ((np.abs(turn) > CORNER) | kink))
+
+
+def _on_fillet(turn: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Whether nodes lie on an arc of few chords: one tangent to the edges before and after it.
+
+    A chord of an arc of curvature k turns by twice asin(k c / 2), half of it at each end.
+    """
+    count = len(turn) - 1 if turn[0] == turn[-1] else len(turn)  # a closed chain ends where it begins
+    after = np.resize(np.append(length, [np.nan] * (count - len(length))), count)
+    before = np.roll(after, 1)
+    across = before**2 + after**2 + 2 * before * after * np.cos(turn[:count])
+    bend = 2 * np.sin(turn[:count]) / np.sqrt(across)
+    found = np.zeros(count, dtype=bool)
+    for node in np.flatnonzero((np.abs(turn[:count]) > CORNER) & (np.abs(turn[:count]) < LARGEST)):
+        alike = np.abs(bend - bend[node]) < ALIKE * np.abs(bend[node])
+        first = last = int(node)
+        while alike[(first - 1) % count] and last - first < count - 2:
+            first -= 1
+        while alike[(last + 1) % count] and last - first < count - 2:
+            last += 1
+        ends = np.array([first - 1, last + 1]) % count
+        half = np.arcsin(bend[node] * np.array([before[first % count], after[last % count]]) / 2)
+        if np.all(np.abs(turn[ends] - half) < ALIKE):
+            found[np.arange(first - 1, last + 2) % count] = True
+    return np.resize(found, len(turn))
 
 
 def _runs(x: np.ndarray, near: float) -> list[tuple[int, int, float]]:
-    """First and last node, and curvature, of the runs of at least three nodes on a line or four on a circle."""
+    """First and last node, and curvature, of runs of three nodes on a line or four on a circle."""
     found, start, last = [], 0, x.shape[1] - 1
     steps = np.diff(x, axis=1)
     area = np.hypot(*steps[:, :-1]) * np.hypot(*steps[:, 1:])
     across = steps[:, :-1] + steps[:, 1:]
-    off = (steps[0, :-1] * steps[1, 1:] - steps[1, :-1] * steps[0, 1:]) / np.hypot(*across)  # from the neighbours' chord
+    off = (steps[0, :-1] * steps[1, 1:] - steps[1, :-1] * steps[0, 1:]) / np.hypot(
+        *across
+    )  # from the neighbours' chord
     straight = np.abs(off) <= 2 * near
-    even = np.abs(np.diff(off / area)) <= 2 * near * (1 / area[:-1] + 1 / area[1:])  # the same curvature at the next node
+    even = np.abs(np.diff(off / area)) <= 2 * near * (
+        1 / area[:-1] + 1 / area[1:]
+    )  # the same curvature at the next node
     while start < last:
         line = arc = start
         if start < len(straight) and straight[start]:
@@ -213,7 +253,7 @@ def _runs(x: np.ndarray, near: float) -> list[tuple[int, int, float]]:
 
 
 def _reach(x: np.ndarray, start: int, fits: Callable[[np.ndarray], bool]) -> int:
-    """The last node such that all from `start` to it fit, looked for by doubling the step and then by halving it."""
+    """The last node such that all from `start` to it fit, found by doubling and halving steps."""
     good, end, step = start + 1, x.shape[1] - 1, 1
     while step and good < end:
         last = min(good + step, end)
@@ -235,7 +275,7 @@ def _on_line(nodes: np.ndarray, near: float) -> bool:
 
 
 def _circle(nodes: np.ndarray, near: float) -> float | None:
-    """The curvature of the circle on which nodes (2, m) lie, positive for a turn to the left; None where they do not."""
+    """The curvature of the circle on which nodes (2, m) lie, positive to the left; None off it."""
     middle = nodes.mean(axis=1, keepdims=True)
     size = np.abs(nodes - middle).max()
     offset = (nodes - middle) / size
@@ -252,7 +292,7 @@ def _circle(nodes: np.ndarray, near: float) -> float | None:
 def _ends(
     turn: np.ndarray, length: np.ndarray, corner: np.ndarray, runs: np.ndarray, closed: bool, arcs: bool
 ) -> np.ndarray:
-    """Curvatures (2, n) at both ends of all edges, from those of the runs and from the circles through three nodes."""
+    """Curvatures (2, n) at both ends of edges, of their runs or of circles through three nodes."""
     n = len(length)
     free = np.isnan(runs)
     if arcs:
@@ -272,7 +312,7 @@ def _ends(
 
 
 class _Blends:
-    """Edges with corners (2, 2, e) and the curvatures (2, e) of the arcs that are blended over them."""
+    """Edges with ends (2, 2, e) and the curvatures (2, e) of the arcs blended over them."""
 
     def __init__(self, corners: np.ndarray, bends: np.ndarray) -> None:
         self.start, self.bends = corners[:, 0], bends

@@ -1,17 +1,18 @@
-"""The smooth surface that the facets of a solid's mesh stand for: planes, spheres, cylinders, and curved patches between them.
+"""The surface that the facets of a solid stand for: planes, spheres, cylinders, curved patches.
 
-Facets are cut into triangles. Where two of them meet at a large angle the body has an edge; between the edges facets in one plane
-are flat, and the others form regions. The nodes of a region may lie on a sphere or on a cylinder. Every other region is a patch of
-quadratic triangles,
+Facets are cut into triangles. Where two of them meet at a large angle the body has an edge; between
+the edges facets in one plane are flat, and the others form regions. The nodes of a region may lie
+on a sphere or on a cylinder. Every other region is a patch of quadratic triangles,
 
     x = sum_i l_i x_i + 4 sum_ij l_i l_j d_ij        (l: barycentric coordinates, i < j),
 
-where d_ij leads from the middle of an edge to the surface: to the node there, of elements of second order; for others by the
-normals n at its ends, d = n ((n_j - n_i) . (x_j - x_i)) / 8, which a quadratic fits to the nodes around a vertex, or which are
-those of a flat facet there. Points in the plane of a flat facet at an edge of the body stay in it.
+where d_ij leads from the middle of an edge to the surface: to the node there, of elements of second
+order; for others by the normals n at its ends, d = n ((n_j - n_i) . (x_j - x_i)) / 8, which a
+quadratic fits to the nodes around a vertex, or which are those of a flat facet there. Points in the
+plane of a flat facet at an edge of the body stay in it.
 
-Source: Nagata (2005), Simple local interpolation of surfaces using normal vectors, Computer Aided Geometric Design 22.
-"""
+Source: Nagata (2005), Simple local interpolation of surfaces using normal vectors, Computer Aided
+Geometric Design 22."""
 
 from __future__ import annotations
 
@@ -29,8 +30,8 @@ from contactopt.bodies.elements import is_curved
 from contactopt.scenes.curves import Curve
 from contactopt.scenes.mesh_repair import outer_corners
 
-EDGE = np.deg2rad(60)  # of elements of second order, whose facets may turn by more before they make an edge of the body
-FIT = 1e-7  # of its size: nodes of a region lie on a sphere or cylinder within this, or the rounding of coordinates
+EDGE = np.deg2rad(60)  # turn of facets of second order from which on there is an edge of the body
+FIT = 1e-7  # of its size: how near the nodes of a region lie to a sphere or cylinder, at least
 FEWEST = 6  # any so many nodes may lie on a sphere or cylinder
 SAMPLE = 1000  # nodes to which spheres and cylinders are fitted
 NEAREST = 16  # triangles among which the one nearest to a point is looked for
@@ -65,9 +66,11 @@ class _Skin:
     """The triangles of the surface of a mesh.
 
     nodes    (3, t) their corners;   owner  (t,) the facet of the mesh
-    corners  (3, 3, t) places of the corners;   off  (3, 3, t) from the middles of edges 01, 12, 20 to the surface
-    planes   (3, 3, t) normals of flat triangles beyond these edges, where the body has an edge; nan elsewhere
-    region   (t,) the number of the region, -1 of flat triangles;   shapes  sphere, cylinder or None for each region
+    corners  (3, 3, t) places of the corners
+    off      (3, 3, t) from the middles of edges 01, 12, 20 to the surface
+    planes   (3, 3, t) normals of flat triangles beyond these edges, nan where the body has no edge
+    region   (t,) the number of the region, -1 of flat triangles
+    shapes   of each region its sphere or cylinder, or None
     known    whether the mesh has curved edges
     """
 
@@ -100,7 +103,7 @@ class _Skin:
             self._guess(free, flat)
 
     def _flat(self, pairs: np.ndarray, sides: np.ndarray, smooth: np.ndarray) -> np.ndarray:
-        """(t,) whether a triangle is flat: all of its piece of the surface, or all triangles around one of its corners."""
+        """(t,) whether a triangle is flat, with its piece of the surface or all others at a corner."""
         level = smooth.copy()
         for here, there in ((0, 1), (1, 0)):
             opposite = self.corners[:, (sides[there] + 2) % 3, pairs[there]]
@@ -128,7 +131,7 @@ class _Skin:
         return _sphere(places, near) or _cylinder(places, self.normals[:, mine], near)
 
     def _guess(self, free: np.ndarray, flat: np.ndarray) -> None:
-        """Set the middles of the edges of triangles in free regions by the normals at their ends."""
+        """Set the middles of the edges in free regions by the normals at their ends."""
         given = np.full((3, self.nodes.max() + 1), np.nan)
         given[:, self.nodes[:, flat]] = self.normals[:, None, flat]
         places = np.empty_like(given)
@@ -144,7 +147,7 @@ class _Skin:
 
 
 def _triangles(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners (3, t) of the triangles of the surface, their facets (t,), and places (3, 3, t) of the middles of their edges."""
+    """Corners (3, t) of the triangles, their facets (t,), and the middles (3, 3, t) of their edges."""
     facets = mesh.boundary_facets()
     nodes = outer_corners(mesh, facets)
     quads = len(nodes) == 4
@@ -181,14 +184,17 @@ def _components(pairs: np.ndarray, count: int) -> np.ndarray:
 
 
 def _vertex_normals(places: np.ndarray, nodes: np.ndarray, normals: np.ndarray, given: np.ndarray) -> np.ndarray:
-    """Normals (3, n) at the nodes of a region of triangles: those given, or of the quadratic that fits the nodes around."""
+    """Normals (3, n) at the nodes of a region: those given, or of quadratics through the nodes around."""
     size = places.shape[1]
     found = np.zeros((3, size))
     for row in nodes:
-        np.add.at(found, (slice(None), row), normals)
+        np.add.at(found.T, row, normals.T)
     mine = np.unique(nodes)
     found[:, mine] /= np.linalg.norm(found[:, mine], axis=0)
-    ends = np.concatenate([nodes, np.roll(nodes, -1, axis=0)], axis=1), np.concatenate([np.roll(nodes, -1, axis=0), nodes], axis=1)
+    ends = (
+        np.concatenate([nodes, np.roll(nodes, -1, axis=0)], axis=1),
+        np.concatenate([np.roll(nodes, -1, axis=0), nodes], axis=1),
+    )
     near = csr_matrix((np.ones(ends[0].size), (ends[0].ravel(), ends[1].ravel())), (size, size))
     around = near + near @ near
     for node in mine.tolist():
@@ -221,7 +227,7 @@ def _sphere(places: np.ndarray, near: float) -> Shape | None:
 
 
 def _cylinder(places: np.ndarray, normals: np.ndarray, near: float) -> Shape | None:
-    """The projection on the cylinder on which places (3, m) lie; the normals of its facets are about normal to its axis."""
+    """The projection on the cylinder on which places (3, m) lie; its facets are along its axis."""
     few = places[:, :: 1 + places.shape[1] // SAMPLE]
     frame = np.linalg.eigh(normals @ normals.T)[1]  # the first direction is the axis, about
 
@@ -286,7 +292,7 @@ class _Patches:
         return found
 
     def _on(self, region: int, points: np.ndarray, chosen: np.ndarray, share: np.ndarray) -> np.ndarray:
-        """Points on their triangles of a region, those in a plane beyond an edge of the body within this plane."""
+        """Points on triangles of a region; those in a plane beyond an edge of the body stay in it."""
         shape = self.shapes[region]
         if shape is None:
             found = np.einsum("ict,ct->it", self.corners[:, :, chosen], share)
@@ -303,7 +309,7 @@ class _Patches:
 
 
 def _in_plane(found: np.ndarray, points: np.ndarray, normal: np.ndarray, shape: Shape | None) -> np.ndarray:
-    """Places (3, m) moved into the planes of the points, as far as they can be on the surface there."""
+    """Places (3, m) moved into the planes of the points, and along them to the surface."""
     if shape is None:
         off = found - points
         inside = off - normal * np.sum(off * normal, axis=0)
@@ -328,7 +334,8 @@ def barycentric(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np
     Returns
     -------
     tuple
-        Coordinates (m, c, dim) of the nearest points of the lines or planes, and distances (m, c) over the sizes of the facets.
+        Coordinates (m, c, dim) of the nearest points of the lines or planes, and distances (m, c)
+        over the sizes of the facets.
     """
     origin, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
     offset = points[:, :, None] - origin

@@ -1,9 +1,9 @@
-"""Meshes divided everywhere or where they are marked, with named boundaries kept and curved boundaries kept curved.
+"""Meshes divided everywhere or where marked; boundaries keep their names and their curvature.
 
-scikit-fem divides the elements: all of them into halves, or marked ones, by red, green and blue patterns in the plane and by
-bisection in space. It forgets the named boundaries. Every new boundary facet lies in one old boundary facet, which gives it its
-names. New nodes then move to the surface that the mesh stands for, which `boundary_curves` finds.
-"""
+scikit-fem divides the elements: all of them into halves, or marked ones, by red, green and blue
+patterns in the plane and by bisection in space. It forgets the named boundaries. Every new boundary
+facet lies in one old boundary facet, which gives it its names. New nodes then move to the surface
+that the mesh stands for, which `boundary_curves` finds."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from contactopt.scenes.mesh_repair import volumes
 
 log = logging.getLogger(__name__)
 NEAREST = 16  # old facets among which the one that holds a new facet is looked for
-FLAT = 0.1  # least share of its volume that an element keeps where its nodes move to a curved boundary
+FLAT = 0.1  # least share of its volume that an element keeps where its nodes move to a curve
 BENT = 0.15  # sagitta of an edge over its length, beyond which the mesh is too coarse for its curve
-SMALLEST = 1e-10  # size of an element that is not divided any more, over its distance from the origin or the size of the body
+SMALLEST = 1e-10  # elements are not divided below this fraction of the coordinates or of the body
 Function = Callable[[np.ndarray], np.ndarray]
 Curves = Mapping[str, Function | None]  # by the name of the boundary; None where it is flat
 
 
 class TooSmall(InputError):
-    """All marked elements are so small that their halves would have no volume in floating-point numbers."""
+    """All marked elements are so small that their halves would have no volume for rounding."""
 
 
 def boundary_curves(mesh: Any, arcs: bool = False) -> dict[str, Curve | None]:
@@ -52,13 +52,27 @@ def boundary_curves(mesh: Any, arcs: bool = False) -> dict[str, Curve | None]:
     Returns
     -------
     dict
-        By the name of the boundary its curve, or None where the boundary is flat. The name '' stands for what has no name.
+        By the name of the boundary its curve, or None where it is flat. The name '' stands for what
+        has no name.
     """
     return plane_curves(mesh, arcs) if len(mesh.p) == 2 else space_curves(mesh, arcs)
 
 
 def boundary_curve(mesh: Any, name: str, arcs: bool = False) -> Curve | None:
-    """Find the line or surface that one boundary of a mesh stands for, as `boundary_curves` finds those of all."""
+    """Find the line or surface of one boundary, as `boundary_curves` finds those of all.
+
+    Parameters
+    ----------
+    mesh, arcs
+        As there.
+    name
+        One of its boundaries, or ''.
+
+    Returns
+    -------
+    Curve or None
+        Its curve; None where it is flat.
+    """
     return boundary_curves(mesh, arcs)[name]
 
 
@@ -97,8 +111,8 @@ def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
     marked
         Numbers of the elements to divide.
     curves
-        For the names of curved boundaries, a function (dim, k) -> (dim, k) that puts new nodes on the true surface. The
-        name '' stands for the boundary that has no name.
+        For the names of curved boundaries, a function (dim, k) -> (dim, k) that puts new nodes on
+        the true surface. The name '' stands for the boundary that has no name.
 
     Returns
     -------
@@ -228,7 +242,7 @@ def bent(mesh: Any, curves: Curves) -> Any:
 
 
 def _shift(shift: np.ndarray, nodes: np.ndarray, places: np.ndarray, size: np.ndarray, curve: Function) -> None:
-    """Write down how nodes at these places move to a curve, as far as it is near in comparison with the size."""
+    """Write down how nodes at these places move to a curve, where it is near beside their size."""
     off = curve(places) - places
     near = np.linalg.norm(off, axis=0) <= BENT * size
     shift[:, nodes[near]] = off[:, near]

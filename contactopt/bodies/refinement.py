@@ -53,7 +53,7 @@ def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
     return scene.with_parts(finer) if splits else scene
 
 
-def part_curves(part: Part, mesh: Any, guess: bool = True) -> dict[str, Curve]:
+def part_curves(part: Part, mesh: Any) -> dict[str, Curve]:
     """Find the curves of all curved boundaries of a part.
 
     Parameters
@@ -62,8 +62,6 @@ def part_curves(part: Part, mesh: Any, guess: bool = True) -> dict[str, Curve]:
         The part.
     mesh
         Its mesh.
-    guess
-        Whether the nodes of a polygon may stand for a smooth curve.
 
     Returns
     -------
@@ -72,11 +70,11 @@ def part_curves(part: Part, mesh: Any, guess: bool = True) -> dict[str, Curve]:
         what has no name.
     """
     found = {name: part.curve_of(name) or curve for name, curve in boundary_curves(mesh).items()}
-    return {name: curve for name, curve in found.items() if curve is not None and (guess or curve.known)}
+    return {name: curve for name, curve in found.items() if curve is not None}
 
 
-def _kept_partners(curve: Curve, mesh: Any, name: str) -> Function:
-    """A curve that leaves points the coordinate along which a boundary extends most, so that nodes of two bodies match.
+def _kept_partners(curve: Function, mesh: Any, name: str) -> Function:
+    """A curve along which points keep one coordinate, so that the nodes of two bodies match.
 
     Where the boundary turns away from this coordinate by more than 45 degrees the curve stays as it is.
     """

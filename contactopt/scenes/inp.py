@@ -1,11 +1,12 @@
 """Input files of CalculiX and Abaqus (.inp): nodes, elements, their sets and surfaces.
 
-meshio keeps only the last of several *NODE blocks, so that the bodies of one file exchange their nodes; it does not know plane and
-axisymmetric elements of second order, sets of sets, and surfaces. A keyword line `*NAME, KEY=VALUE` is followed by lines
-of data. Elements without an extent (springs, masses, couplings) are passed over.
+meshio keeps only the last of several *NODE blocks, so that the bodies of one file exchange their
+nodes; it does not know plane and axisymmetric elements of second order, sets of sets, and surfaces.
+A keyword line `*NAME, KEY=VALUE` is followed by lines of data. Elements without an extent (springs,
+masses, couplings) are passed over.
 
-Source: CalculiX CrunchiX user's manual, version 2.20, chapters "Element types" and "Input deck format".
-"""
+Source: CalculiX CrunchiX user's manual, version 2.20, chapters "Element types" and "Input deck
+format"."""
 
 from __future__ import annotations
 
@@ -69,7 +70,9 @@ def read_inp(path: Path) -> Any:
         np.array([read.nodes[tag] for tag in tags]).reshape(-1, 3),
         [(kind, np.searchsorted(tags, nodes)) for kind, nodes, _ in blocks],
         cell_sets={name: [_places(ids, found) for _, _, ids in blocks] for name, found in read.element_sets.items()},
-        point_sets={name: np.searchsorted(tags, sorted(found & read.nodes.keys())) for name, found in read.node_sets.items()},
+        point_sets={
+            name: np.searchsorted(tags, sorted(found & read.nodes.keys())) for name, found in read.node_sets.items()
+        },
     )
 
 
@@ -79,7 +82,8 @@ def _places(ids: np.ndarray, found: set[int]) -> np.ndarray:
 
 def _blocks(path: Path, depth: int) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
     """Keyword in lower case, options, and the rows of data of each block; included files in their place."""
-    keyword, options, rows = "", {}, []
+    keyword, rows = "", list[list[str]]()
+    options: dict[str, str] = {}
     if depth > DEEPEST:
         raise ValueError("files include each other without end")
     with path.open(errors="replace") as file:

@@ -35,7 +35,7 @@ TAGS = (
     "flac3d:group",
     "netgen:index",
 )
-# formats whose readers end on a damaged file; those of others, and of binary files, may wait or take memory without bound
+# formats whose readers end on damaged text; others, and those of binary files, may not
 SAFE = ("gmsh", "vtu", "vtk", "abaqus", "xdmf", "medit", "nastran", "med", "netgen", "avsucd")
 PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte
 MEMORY = 4_000_000_000, 50  # bytes that such a reader gets, and more per byte

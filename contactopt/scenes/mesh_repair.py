@@ -16,7 +16,10 @@ from scipy.spatial import KDTree
 from contactopt.errors import InputError
 
 SAME = 1e-6  # places this fraction of a size apart are one place
-ONE, APART = 1e-4, 1e-3  # nodes are one, or two, if they are less, or more, than this fraction of the shortest edge apart
+ONE, APART = (
+    1e-4,
+    1e-3,
+)  # nodes are one, or two, if they are less, or more, than this fraction of the shortest edge apart
 FLAT = 1e-10  # an element of less volume, over that of a cube of its size, is degenerate
 CLOSED = 1e-9  # what the normals of a closed surface may sum up to, over its area
 CORNERS = {
@@ -154,7 +157,7 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
 
 
 def _near_pairs(cells: Cells, used: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs (m, 2) of nodes nearer than APART of the shortest edge at one of them, how far they are apart, and that edge."""
+    """Pairs (m, 2) of nodes nearer than APART of the shortest edge there, how far apart, and that edge."""
     corners = cells.points[:, cells.corners].transpose(1, 0, 2)
     edge = np.min([np.linalg.norm(a - b, axis=0) for a, b in combinations(corners, 2)], axis=0)
     shortest = np.full(cells.points.shape[1], np.inf)
@@ -337,7 +340,7 @@ def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
 
 
 def _area_vectors(corners: np.ndarray) -> np.ndarray:
-    """Area times normal (dim, f) of facets with corners (dim, c, f) in their order, the normal on the right of edges."""
+    """Area times normal (dim, f) of facets with corners (dim, c, f); on the right of edges."""
     if len(corners) == 2:
         x, y = corners[:, 1] - corners[:, 0]
         return np.stack([y, -x])

@@ -27,7 +27,8 @@ def version(path: Path) -> tuple[str | None, bool]:
     Returns
     -------
     tuple
-        The version, such as '4.1', where '4' stands for 4.0, or None if it is no file of Gmsh; and whether it is binary.
+        The version, such as '4.1', where '4' stands for 4.0, or None if it is no file of Gmsh; and
+        whether it is binary.
     """
     with path.open("rb") as file:
         head = file.read(200).decode(errors="replace").split()
