@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from contactopt.analysis.accuracy import Estimate, refine
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.paths import PathResult, solve_states
-from contactopt.analysis.quantities import approach, peak_pressure, stick_width, width
+from contactopt.analysis.quantities import Reading, approach, pressure_reading, stick_width, width
 from contactopt.analysis.resolution import remarks
 from contactopt.analysis.resultants import mirrors, tables
 from contactopt.analysis.solve_scene import Options, Solved
@@ -34,10 +33,11 @@ from contactopt.scenes.scene import Part, Scene
 from contactopt.solving.methods import default_method, find_method
 
 if TYPE_CHECKING:
-    from contactopt.adaptivity.loop import AdaptedEstimate
+    from contactopt.accuracy.estimate import Estimate
     from contactopt.scenes.scene_files import SceneFile
 
 Note = Callable[[str], None]
+APART = 0.05  # relative difference of two readings of the largest pressure that is told
 PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work")
 
 
@@ -59,7 +59,7 @@ class Result:
     zones: tuple[float, ...]
     summary: dict[str, Any]
     path: PathResult | None = None
-    estimate: Estimate | AdaptedEstimate | None = None
+    estimate: Estimate | None = None
 
     def __repr__(self) -> str:
         s = self.summary
@@ -173,10 +173,10 @@ def run(
     elements : across the contact half-width
     accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
         sentence in `Result.estimate` says why not; `elements` only scales the first mesh
-    quantity : a name in contactopt.analysis.quantities.QUANTITIES; of one of several pairs of surfaces 'NAME:PAIR'; or one of
+    quantity : a name of contactopt.derivatives.outputs; of one of several pairs of surfaces 'NAME:PAIR'; or one of
         contactopt.analysis.places, such as 'von_mises:BODY:BOUNDARY' or 'pressure@X,Y'
-    adaptive : whether meshes are refined only where the quantity needs it (contactopt.adaptivity), each body by itself, and not
-        everywhere; quadrilaterals become triangles. More quantities can be bounded then, see contactopt.derivatives.outputs
+    adaptive : whether meshes are refined only where the quantity needs it (contactopt.accuracy), each body by itself, and not
+        everywhere; quadrilaterals become triangles
     max_unknowns, time_limit, max_memory : bounds on the search for the accuracy: unknowns of a mesh, seconds and GB of all. No
         further mesh is begun that would pass one; the result is then the best answer so far, with its estimate
         All arguments from `method` to here may stand in a scene file; those given here win.
@@ -228,6 +228,8 @@ def run(
     if simplest:
         states, known = _simplest(states, options)
         backends = chosen.backends(states[-1].dim)
+    if team is not None and team.size > 1 and aim is not None and (aim.adaptive or states[-1].given):
+        raise InputError("meshes on several ranks are not refined locally; run on one rank, or without an accuracy.")
     if team is not None:
         idle = team.size - sum(isinstance(part, Part) for part in states[-1].parts)
         if idle > 0:
@@ -385,20 +387,15 @@ def _aim(accuracy: float | None, quantity: str | None, adaptive: bool, bounds: d
 
 def _solve(
     states: tuple[Scene, ...], aim: Aim | None, options: Options
-) -> tuple[Solved, PathResult | None, Estimate | AdaptedEstimate | None]:
+) -> tuple[Solved, PathResult | None, Estimate | None]:
     """The scene or its load path, on its own mesh or on meshes refined to an accuracy."""
     if aim is None:
         solved = solve_states(states, options=options)
         return solved, solved.path, None
-    if not aim.adaptive:
-        mesh, estimate = refine(states, aim.quantity, aim.accuracy, options, aim.limits)
-        return mesh.solved, mesh.solved.path, estimate
-    if len(states) > 1:
-        raise InputError(f"scene '{states[0].name}' has a load path, which adaptive refinement does not follow.")
-    from contactopt.adaptivity import refine_locally  # it brings the room of derivatives with it
+    from contactopt.accuracy.loop import refine  # it brings the room of derivatives with it
 
-    solved, adapted = refine_locally(states[0], aim.quantity, aim.accuracy, options, aim.limits)
-    return solved, None, adapted
+    solved, estimate = refine(states, aim.quantity, aim.accuracy, options, aim.limits, aim.adaptive)
+    return solved, solved.path, estimate
 
 
 def _summary(
@@ -406,13 +403,15 @@ def _summary(
     method: str,
     backends: tuple[str, str],
     path: PathResult | None,
-    estimate: Estimate | AdaptedEstimate | None,
+    estimate: Estimate | None,
 ) -> dict[str, Any]:
     """What is known of the answer but for the seconds: half-widths and pressure are the quantities that accuracy bounds."""
     reduction, solution = solved.reduction, solved.solution
     problem, r = reduction.problem, solution.reactions
     found = tables(reduction, solution)
     single = len(problem.pairs) == 1
+    largest = max(pair["max_pressure"] for pair in found["pairs"].values())
+    peak = pressure_reading(reduction, solution) if single else None
     summary: dict[str, Any] = {
         "scene": reduction.scene.name,
         "kind": reduction.scene.kind,
@@ -432,11 +431,11 @@ def _summary(
         "approach": approach(problem, solution),
         "contact_half_width": width(reduction, solution) if single else None,
         "stick_half_width": stick_width(reduction, solution)[0] if single else None,
-        "max_pressure": max(pair["max_pressure"] for pair in found["pairs"].values()),
-        "pressure": peak_pressure(reduction, solution) if single else None,
+        "max_pressure": largest,
+        "pressure": None if peak is None else peak.value,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
-        "remarks": list(remarks(reduction, solution)),
+        "remarks": [*remarks(reduction, solution), *([] if peak is None else _smoothed(peak, largest))],
         **found,
     }
     if path is not None:
@@ -445,6 +444,16 @@ def _summary(
     if estimate is not None:
         summary["accuracy"] = asdict(estimate)
     return summary
+
+
+def _smoothed(peak: Reading, largest: float) -> list[str]:
+    """One sentence where the largest pressure at a node and the one that is read around it are not the same."""
+    if abs(largest - peak.value) <= APART * abs(largest):
+        return []
+    return [
+        f"the largest pressure at a node is {largest:.4g}, what its neighbours let expect is {peak.value:.4g}, give or take "
+        f"{peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
+    ]
 
 
 @contextmanager

@@ -7,12 +7,18 @@ from conftest import MATERIAL
 from turned import moved, turn
 
 from contactopt import InputError, Part, Rigid, Scene, Support, reduce, scenes, solve
-from contactopt.adaptivity import refine_locally
-from contactopt.adaptivity.estimate import element_errors
+from contactopt.accuracy import refine
+from contactopt.accuracy.indicators import element_errors
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.solve_scene import solve_scene
 from contactopt.bodies.local_refinement import boundary_curve, divide, simplices
+from contactopt.derivatives.outputs import find_quantity
 from contactopt.scenes import make_scene
+
+
+def locally(scene, *arguments, **limits):
+    return refine([scene], *arguments, adaptive=True, **limits)
+
 
 NAMES = {"bottom": lambda x: x[-1] == 0, "corner": lambda x: (x[0] == 1) & (x[-1] < 0.4)}
 TICKS = np.linspace(0, 1, 4)
@@ -100,8 +106,8 @@ def reduce_body(scene):
 def test_the_estimate_agrees_with_the_error(quantity):
     """Against the same quantity on a mesh that is four times as fine near the corner."""
     scene = scenes.flat_punch(2, mu=0.5)
-    best = refine_locally(scene, quantity, 4e-4)[1]
-    coarse = refine_locally(scene, quantity, 8e-3)[1]
+    best = locally(scene, quantity, 4e-4)[1]
+    coarse = locally(scene, quantity, 8e-3)[1]
     error = abs(best.extrapolated - coarse.value) / best.extrapolated
     assert best.reached and coarse.reached
     assert 0.5 < coarse.error / error < 4
@@ -111,7 +117,7 @@ def test_the_estimate_agrees_with_the_error(quantity):
 def test_unknowns_go_where_the_quantity_needs_them():
     """For the peak pressure of Hertz the elements at the contact become small and the rest of the mesh stays as it is."""
     scene = make_scene("cylinder-2d", mu=0.0)
-    solved, estimate = refine_locally(scene, "pressure", 5e-3)
+    solved, estimate = locally(scene, "pressure", 5e-3)
     assert estimate.reached and solved.solution.solved
     assert estimate.value == pytest.approx(scene.reference.peak, rel=5e-3)
     first, last = estimate.levels[0], estimate.levels[-1]
@@ -121,13 +127,14 @@ def test_unknowns_go_where_the_quantity_needs_them():
 @pytest.mark.parametrize("angle", [30.0, 137.0])
 def test_a_turned_scene_is_refined_the_same(angle):
     scene = pressed_block(4)
-    straight, turned = (refine_locally(each, "energy", 0.02)[1] for each in (scene, moved(scene, turn(angle))))
+    straight, turned = (locally(each, "energy", 0.02)[1] for each in (scene, moved(scene, turn(angle))))
     assert [level.unknowns for level in turned.levels] == [level.unknowns for level in straight.levels]
     assert turned.value == pytest.approx(straight.value, rel=1e-9)
 
 
 def test_what_elements_add_is_the_whole_estimate():
-    errors = element_errors(solve_scene(pressed_block(6)), "energy")
+    solved = solve_scene(pressed_block(6))
+    errors = element_errors(solved, find_quantity("energy", solved.reduction.scene), 1.0)
     marked = errors.marked(0.6)
     sizes = np.abs(errors.bodies[0])
     assert errors.total == pytest.approx(sizes.sum()) and len(errors.bodies[1]) == 0
@@ -137,10 +144,10 @@ def test_what_elements_add_is_the_whole_estimate():
 
 def test_bounds_end_the_loop_with_the_best_answer():
     scene = pressed_block(4)
-    solved, estimate = refine_locally(scene, "energy", 1e-9, limits=Limits(500))
+    solved, estimate = locally(scene, "energy", 1e-9, limits=Limits(500))
     assert solved.solution.solved and not estimate.reached and "500" in estimate.message
     assert estimate.levels[-1].unknowns <= 500 and len(estimate.levels) > 1
-    _, estimate = refine_locally(scene, "energy", 1e-9, limits=Limits(seconds=0.0))
+    _, estimate = locally(scene, "energy", 1e-9, limits=Limits(seconds=0.0))
     assert len(estimate.levels) == 1 and "time limit" in estimate.message
 
 
@@ -150,11 +157,11 @@ def test_bounds_end_the_loop_with_the_best_answer():
 )
 def test_bad_input(arguments, words):
     with pytest.raises(InputError, match=words):
-        refine_locally(pressed_block(2), *arguments)
+        locally(pressed_block(2), *arguments)
 
 
 def test_solutions_on_refined_meshes_are_those_of_the_same_mesh():
-    solved, _ = refine_locally(pressed_block(4), "energy", 0.03)
+    solved, _ = locally(pressed_block(4), "energy", 0.03)
     again = solve(reduce(solved.reduction.scene))
     assert np.allclose(again.reactions, solved.solution.reactions, atol=1e-6 * again.reactions.max())
 

@@ -134,7 +134,7 @@ def test_the_pressure_under_a_flat_punch_is_read_between_its_nodes():
     solved = solve_scene(scene)
     a, force = scene.reference.half_width, 100.0 / 40.0
     for place in (0.013 * a, 0.31 * a, 0.62 * a):
-        found = read_place(place_of(f"pressure@{place},0", scene), solved.reduction, solved.solution)[0]
+        found = read_place(place_of(f"pressure@{place},0", scene), solved.reduction, solved.solution).value
         assert found == pytest.approx(force / (np.pi * np.sqrt(a**2 - place**2)), rel=0.02)
 
 
@@ -148,7 +148,7 @@ def test_the_largest_stress_under_a_line_contact_is_where_it_should_be():
     )
     a, peak = scene.reference.half_width, scene.reference.peak
     assert found.value == pytest.approx(0.558 * peak, rel=0.02)
-    assert abs(found.place[0]) < 0.1 * a and abs(found.place[1]) == pytest.approx(0.704 * a, rel=0.15)
+    assert abs(found.peaks[0].place[0]) < 0.1 * a and abs(found.peaks[0].place[1]) == pytest.approx(0.704 * a, rel=0.15)
 
 
 def test_the_scatter_of_the_elements_is_the_uncertainty_of_the_fit():

@@ -8,7 +8,7 @@ from skfem import MeshTri
 
 import contactopt
 from contactopt import InputError, Material, Part, Plate, Rigid, Scene, cli, run
-from contactopt.analysis.quantities import QUANTITIES
+from contactopt.analysis.quantities import value_of
 
 KEYS = [
     "scene",
@@ -191,8 +191,8 @@ def test_the_summary_reports_the_stick_zone_that_accuracy_bounds():
 def test_the_history_of_a_path_holds_the_quantities_that_accuracy_bounds():
     path = run("cattaneo-2d", steps=1, elements=16).path
     a, c = path.history["contact_half_width"][-1], path.history["stick_half_width"][-1]
-    assert QUANTITIES["width"](path.reduction, path.solution) == pytest.approx(a, rel=1e-10)
-    assert QUANTITIES["stick"](path.reduction, path.solution) == pytest.approx(c / a, rel=1e-10)
+    assert value_of("width", path.reduction, path.solution) == pytest.approx(a, rel=1e-10)
+    assert value_of("stick", path.reduction, path.solution) == pytest.approx(c / a, rel=1e-10)
 
 
 def test_the_summary_on_disk_is_that_of_the_result(tmp_path):

@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from contactopt import solve
 from contactopt.analysis.edges import contact_edge, stick_edge
-from contactopt.analysis.quantities import QUANTITIES
+from contactopt.analysis.quantities import value_of
 from contactopt.analysis.solve_scene import Options, solve_scene
 from contactopt.analysis.status import contact_status
 from contactopt.solving.preconditioners import preconditioner
@@ -56,7 +56,7 @@ def test_a_turned_scene_has_the_same_answer(plain, name, _, R):
         value = read(a.reduction.scene, p, r)
         assert value > 0 and read(b.reduction.scene, q, b.solution.reactions) == pytest.approx(value, rel=1e-8)
     for quantity in ("pressure", "width", "stick", "energy"):
-        one, two = (QUANTITIES[quantity](s.reduction, s.solution) for s in (a, b))
+        one, two = (value_of(quantity, s.reduction, s.solution) for s in (a, b))
         assert two == pytest.approx(one, rel=1e-7)
 
 

@@ -9,7 +9,10 @@ SMOOTH = 3, 6  # rings of nodes left out and fitted where contact ends by itself
 NEAR = 1, 2  # the same where the values are straight only next to the edge
 INNER = 0.3  # share of the half-width from which on the squared pressure on a line is fitted
 OUTER = 2  # nodes next to the edge of contact that this fit leaves out
-WINDOW = 0.5  # share of the distance from the largest pressure to the edge over which the peak is fitted
+FITTED = {2: 5, 3: 13}  # nodes to which the square of the pressure is fitted around a peak, by dimension
+NEIGHBOURS = {2: 5, 3: 9}  # nodes among which a local maximum is the largest, itself among them
+MOST_PEAKS = 8  # local maxima that are looked at
+WITHIN = 0.05  # least uncertainty of an edge that is read between nodes, over the distance of the nodes
 
 # The zone loop (contactopt.analysis.zone).
 AGREE = 0.05  # two zones agree when they differ by less than this fraction of an element
@@ -20,7 +23,7 @@ COARSEST = 4  # elements across the contact half-width of the first of nested me
 FACTOR = {2: 8, 3: 4}  # coarser than the next of them, where bodies are factorised: a 64th of the unknowns
 ROUGH = 1e-6  # certificate asked of a coarse mesh: its own error is larger
 
-# Refinement (contactopt.analysis.accuracy).
+# Refinement (contactopt.accuracy).
 FIRST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least, by dimension
 BELOW = 8  # by how much fewer than the scene's default they are
 MOST_UNKNOWNS = {2: 400_000, 3: 150_000}  # displacement unknowns, by dimension: half a minute

@@ -19,13 +19,14 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import KDTree
 
-from contactopt.analysis.constants import INNER, NEAR, OUTER, SMOOTH
+from contactopt.analysis.constants import INNER, NEAR, OUTER, SMOOTH, WITHIN
 from contactopt.analysis.patches import End, patches_of
 from contactopt.analysis.status import contact_status
 from contactopt.problem import InterfaceProblem
 from contactopt.scenes.scene import Scene
 
-Reader = Callable[[End], list[float]]
+Read = tuple[float, float]  # a distance and its uncertainty
+Reader = Callable[[End], Read | None]
 
 
 def equivalent_half_width(scene: Scene, area: float) -> float:
@@ -71,13 +72,20 @@ def contact_area(scene: Scene, half_width: float) -> float:
 
 
 def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
-    """Read the half-width of the contact zone.
+    """Read the half-width of the contact zone [length], as contact_zone() does."""
+    return contact_zone(scene, problem, reactions)[0]
+
+
+def contact_zone(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> tuple[float, float]:
+    """Read the half-width of the contact zone, with its uncertainty.
 
     Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against x^2 over the outer
     part of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than three
     nodes are left, and where the other end is a corner, a straight line goes through the rings of nodes next to the edge.
     Where every node touches, or where contact ends at a corner, the edge is that of the contact surface. A reading on a
-    surface counts only where the disc of that radius has the area of the zone to within an element.
+    surface counts only where the disc of that radius has the area of the zone to within an element. The uncertainty is
+    half of what the parabola and the straight line differ, WITHIN of an element at least. Where areas of nodes are
+    counted, it is that of the nodes at the edge.
 
     Parameters
     ----------
@@ -90,19 +98,22 @@ def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
 
     Returns
     -------
-    float
-        The half-width [length]; 0 without contact.
+    tuple
+        The half-width and its uncertainty [length]; both are 0 without contact.
     """
     touching = contact_status(problem, reactions).touching
     pressure = reactions[:, 0] / problem.areas
 
-    def read(end: End) -> list[float]:
-        if problem.dim == 2 and end.free and (edge := _zero_of_parabola(end, pressure, problem.areas)) is not None:
-            return [edge]
-        edge = end.inner(pressure, SMOOTH)
-        return [] if edge is None else [end.clip(edge)]
+    def read(end: End) -> Read | None:
+        line = end.inner(pressure, SMOOTH)
+        line = None if line is None else end.clip(line)
+        if problem.dim == 2 and end.free:
+            edge = _zero_of_parabola(end, pressure, problem.areas)
+            if edge is not None:
+                return edge, end.step / 2 if line is None else abs(edge - line) / 2
+        return None if line is None else (line, end.step / 2)
 
-    return _half_width(scene, problem, touching, np.abs(reactions[:, 0]), read)[0]
+    return _half_width(scene, problem, touching, np.abs(reactions[:, 0]), read)
 
 
 def stick_edge(
@@ -130,27 +141,35 @@ def stick_edge(
     Returns
     -------
     tuple
-        The half-width and its uncertainty [length]; both are 0 without stick.
+        The half-width and its uncertainty [length].
     """
     status = contact_status(problem, reactions)
-    contact = contact_edge(scene, problem, reactions)
-    if not status.stick.any():
-        return 0.0, 0.0
+    contact, uncertain = contact_zone(scene, problem, reactions)
+    if not status.stick.any():  # or on less than what belongs to one contact
+        least = problem.areas[problem.law.rough & status.touching]
+        return 0.0, equivalent_half_width(scene, float(least.max(initial=0.0)))
     if not status.slip.any():
-        return contact, 0.0
+        return contact, uncertain
     bound, r_t = problem.law.bound(reactions[:, 0]), reactions[:, 1:]
     slack = bound - np.sum(r_t * _directions(problem, r_t, status.slip), axis=1)
     relative = slack / np.where(bound > 0, bound, 1.0)
     distance = None if slip is None else np.linalg.norm(slip, axis=1)
 
-    def read(end: End) -> list[float]:
+    def read(end: End) -> Read | None:
         if status.open[end.contact].any():  # contact ends by itself beyond the stick zone
             edge = end.inner(slack / problem.areas, SMOOTH)
-            return [] if edge is None else [end.clip(edge)]
-        edges = [end.inner(relative, NEAR)]
+            if edge is None:
+                return None
+            other = end.inner(slack / problem.areas, NEAR)
+            apart = end.step if other is None else abs(end.clip(edge) - end.clip(other))
+            return end.clip(edge), apart / 2
+        found = [end.inner(relative, NEAR)]
         if distance is not None:
-            edges.append(end.outer(distance, NEAR))
-        return [edge for edge in edges if edge is not None and end.clip(edge) == edge]
+            found.append(end.outer(distance, NEAR))
+        edges = [edge for edge in found if edge is not None and end.clip(edge) == edge]
+        if not edges:
+            return None
+        return float(np.mean(edges)), float(np.ptp(edges) if len(edges) > 1 else end.step) / 2
 
     width, uncertainty = _half_width(scene, problem, status.stick, problem.areas, read)
     return min(width, contact), uncertainty
@@ -163,20 +182,24 @@ def _half_width(
 
     weights  (k,) by which the centre of a zone on a surface is averaged
     """
-    counted = equivalent_half_width(scene, float(problem.areas[inside].sum()))
+    area = float(problem.areas[inside].sum())
+    counted = equivalent_half_width(scene, area)
+    nodes = inside.sum() * 2.0 ** sum(problem.chart.mirrored)
+    share = 1 / nodes if problem.dim == 2 else (np.pi / nodes) ** 0.5 if nodes else 0.0  # of the nodes at the edge
+    coarse = counted, float(counted * min(1.0, share)) if nodes else 0.0
     if inside.all() or not inside.any():
-        return counted, 0.0
+        return coarse
     if scene.kind == "axisymmetric" and not problem.chart.mirrored[0]:
-        return counted, 0.0  # a ring: its chart does not tell the distance from the axis
+        return coarse  # a ring: its chart does not tell the distance from the axis
     found = [patch.measure(read) for patch in patches_of(problem, inside, weights)]
     if not found or any(patch is None for patch in found):
-        return counted, 0.0
+        return coarse
     ends = [patch for patch in found if patch is not None]
-    if problem.dim == 3 and abs(ends[0].last - np.sqrt(problem.areas[inside].sum() / np.pi)) > ends[0].step:
-        return counted, 0.0  # no disc: the zone reaches the rim of the surface on some sides, or is long
-    uncertainty = sum(patch.copies * patch.uncertainty for patch in ends)
+    if problem.dim == 3 and abs(ends[0].last - np.sqrt(area / np.pi)) > ends[0].step:
+        return coarse  # no disc: the zone reaches the rim of the surface on some sides, or is long
+    uncertainty = sum(patch.copies * max(patch.uncertainty, WITHIN * patch.step) for patch in ends)
     if scene.kind == "axisymmetric":  # a ring between two distances from the axis, or a disc
-        squares = (abs(patch.last**2 - (patch.first**2 if patch.first > 0 or patch.last < 0 else 0)) for patch in ends)
+        squares = (abs(p.last**2 - (p.first**2 if p.first > 0 or p.last < 0 else 0)) for p in ends)
         return float(np.sqrt(sum(squares))), uncertainty
     return sum(patch.copies * (patch.last - patch.first) / 2 for patch in ends), uncertainty
 

@@ -99,7 +99,7 @@ class Patch:
     copies: int
     points: np.ndarray
 
-    def measure(self, read: Callable[[End], list[float]]) -> Ends | None:
+    def measure(self, read: Callable[[End], tuple[float, float] | None]) -> Ends | None:
         """The ends of the patch from the readings of each; None where one of them cannot be read.
 
         An end at the end of the contact surface is the place of the last node. The centre, from which readings count
@@ -124,7 +124,9 @@ class Patch:
     def _step_at(self, edge: float) -> float:
         return self.step(self.contact, self.place, edge)
 
-    def _read(self, sign: float, centre: float, read: Callable[[End], list[float]]) -> tuple[float, float] | None:
+    def _read(
+        self, sign: float, centre: float, read: Callable[[End], tuple[float, float] | None]
+    ) -> tuple[float, float] | None:
         """Distance of one end from the centre and its uncertainty [length]."""
         distance = sign * (self.place - centre) if not self.centred else np.abs(self.place)
         # A centre that rounding moves off a node must not take it from either side.
@@ -133,11 +135,11 @@ class Patch:
         if not inside.any():
             return None
         last = float(distance[inside].max())
+        step = self.step(contact, distance, last)
         if inside.all():
-            return last, 0.0
+            return last, step / 2
         free = self.centred or not bool(self.inside[~side].all())
-        edges = read(End(contact, distance, inside, self.step(contact, distance, last), free))
-        return (float(np.mean(edges)), float(np.ptp(edges)) / 2) if edges else None
+        return read(End(contact, distance, inside, step, free))
 
     def step(self, contact: np.ndarray, distance: np.ndarray, edge: float) -> float:
         """Distance between neighbouring contacts next to an edge at that distance [length]."""

@@ -18,7 +18,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from contactopt.analysis.constants import MOST_PEAKS
+from contactopt.analysis.quantities import Peak, Reading
+from contactopt.bodies.elements import straight
 from contactopt.bodies.protocol import Region
 from contactopt.errors import InputError
 from contactopt.interface.reduction import Reduction
@@ -29,8 +33,10 @@ if TYPE_CHECKING:
     from contactopt.bodies.recovery import StressMap
 
 LARGEST = "von_mises"
+OUTSIDE = 0.05  # how far beyond the coordinates of a body a point may lie before anything is solved, over its size
 DEVIATIONS = 2  # standard errors of a fit that a stress may be off: 95 of 100 are within two
 RIVAL = 0.5  # of the largest scatter, which the places need that are to be looked at more closely
+AROUND = {2: 9, 3: 17}  # vertices among which a local maximum is the largest, itself among them
 NEAREST = {2: 4, 3: 8}  # contacts through which the pressure near a place is fitted
 PLACED = ("von_mises:BODY", "von_mises:BODY:BOUNDARY", "von_mises:BODY@X,Y", "stress_xx:BODY@X,Y", "pressure@X,Y")
 
@@ -52,18 +58,16 @@ class Place:
 class StressReading:
     """A stress, and what it was read from.
 
-    value  [stress];   place (dim,) where it is [length];   vertex  of the mesh there, or -1;   size  of the elements there [length]
+    value  [stress]
     uncertainty  by how much it may be off because stresses scatter from element to element [stress]
-    doubtful  numbers of the elements where the stress may be larger than the value, or is as uncertain as it
+    peaks  where it is, with the elements where the stress may be larger than the value or is as uncertain as it; of a
+           largest stress then its other local maxima
     body   its number among the parts of the scene;   map, slopes (m, 4 or 6)  of the recovered stress, for its derivative
     """
 
     value: float
-    place: np.ndarray
-    vertex: int
-    size: float
     uncertainty: float
-    doubtful: np.ndarray = field(repr=False)
+    peaks: tuple[Peak, ...] = field(repr=False)
     body: int
     map: StressMap = field(repr=False)
     slopes: np.ndarray = field(repr=False)
@@ -96,6 +100,9 @@ def place_of(name: Any, scene: Scene) -> Place | None:
     head, at, where = name.partition("@")
     kind, _, rest = head.partition(":")
     if kind == "pressure" and at:
+        pairs = [pair.name for pair in scene.pairs]
+        if rest not in pairs and (rest or len(pairs) > 1):
+            raise InputError(f"quantity {name!r}: name one pair of surfaces, as in 'pressure:{pairs[0]}@...'.")
         return Place(name, kind, rest, _around(name, where, scene))
     stress = kind.removeprefix("stress_")
     if kind != LARGEST and stress == kind:
@@ -114,7 +121,30 @@ def place_of(name: Any, scene: Scene) -> Place | None:
         raise InputError(f"quantity {name!r}: a component of the stress is read at a point, as in '{kind}:{body}@1,2'.")
     if boundary and at:
         raise InputError(f"quantity {name!r}: give either a boundary or a point.")
+    part = next(part for part in scene.parts if isinstance(part, Part) and part.name == body)
+    _check_there(part, region, scene)
     return Place(name, kind if kind == LARGEST else stress, body, region)
+
+
+def _check_there(part: Part, region: Region, scene: Scene) -> None:
+    """InputError for a boundary that the first mesh of a body does not have, and for a point far outside it."""
+    if not region.boundary and not region.point:
+        return
+    mesh = part.build_mesh(scene.elements, scene.zone)
+    known = mesh.boundaries or {}
+    if region.boundary and region.boundary not in known:
+        raise InputError(
+            f"body '{part.name}' has no boundary {region.boundary!r}; it has {', '.join(sorted(known)) or 'none'}."
+        )
+    if region.point:
+        corners = straight(mesh).p
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        slack = OUTSIDE * (high - low).max() + (region.radius or 0.0)
+        if np.any(region.point < low - slack) or np.any(region.point > high + slack):
+            place = ", ".join(f"{x:g}" for x in region.point)
+            raise InputError(
+                f"the point ({place}) lies outside body '{part.name}'; give one inside it or on its surface."
+            )
 
 
 def _around(name: str, where: str, scene: Scene) -> Region:
@@ -168,19 +198,33 @@ def read_stress(place: Place, reduction: Reduction, displaced: tuple[np.ndarray,
     top = int(np.argmax(sizes))
     scatter = DEVIATIONS * recovered.deviation(displaced[number], slopes)
     above = sizes + scatter - sizes[top]
-    rivals = np.flatnonzero((above > 0) & (scatter >= RIVAL * scatter[above > 0].max(initial=0.0)))
+    doubtful = (above > 0) & (scatter >= RIVAL * scatter[above > 0].max(initial=0.0))
     slopes[np.arange(len(slopes)) != top] = 0.0
-    return StressReading(
-        float(sizes[top]),
-        recovered.places[:, top],
-        int(recovered.sources[top]),
-        recovered.size(top),
-        float(above.max()),
-        recovered.elements(rivals),
-        number,
-        recovered,
-        slopes,
-    )
+    uncertainty = float(above.max())
+    others = [i for i in _tops(recovered.places, sizes) if i != top] if place.kind == LARGEST else []
+    nothing = np.empty(0, dtype=int)
+    peaks = [
+        Peak(
+            float(sizes[i]),
+            uncertainty if i == top else float(scatter[i]),
+            recovered.places[:, i],
+            recovered.size(i),
+            nothing,
+            number,
+            recovered.elements(np.flatnonzero(doubtful) if i == top else np.array([i])),
+        )
+        for i in (top, *others)
+    ]
+    return StressReading(float(sizes[top]), uncertainty, tuple(peaks), number, recovered, slopes)
+
+
+def _tops(places: np.ndarray, sizes: np.ndarray) -> list[int]:
+    """Numbers of the places (dim, m) where a size (m,) is that of no neighbour exceeded, the largest of them first."""
+    count = min(AROUND[len(places)], len(sizes))
+    near = cKDTree(places.T).query(places.T, k=count)[1].reshape(len(sizes), count)
+    chosen = np.flatnonzero(sizes >= sizes[near].max(axis=1))
+    order = np.argsort(-sizes[chosen], kind="stable")[:MOST_PEAKS]
+    return [int(i) for i in chosen[order]]
 
 
 def map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> StressMap:
@@ -226,18 +270,9 @@ def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
     -------
     (k, dim) array
         The contributions [1 / length^2].
-
-    Raises
-    ------
-    InputError
-        For a pair that the scene does not have, and where several are there to choose from.
     """
     problem = reduction.problem
     pairs = {pair.name: pair for pair in problem.pairs}
-    if place.owner not in pairs and (place.owner or len(pairs) > 1):
-        raise InputError(
-            f"quantity {place.name!r}: name one pair of surfaces, as in 'pressure:{next(iter(pairs))}@...'."
-        )
     own = np.zeros(problem.contacts, dtype=bool)
     own[pairs[place.owner].contacts if place.owner else slice(None)] = True
     own &= problem.areas > 0
@@ -253,9 +288,55 @@ def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
     return weights
 
 
-def read_place(place: Place, reduction: Reduction, solution: Solution) -> tuple[float, float]:
-    """The value of a quantity at a place and, of a stress, by how much it may be off [stress]."""
-    if place.kind == "pressure":
-        return float(np.sum(pressure_weights(place, reduction) * solution.reactions)), 0.0
-    found = read_stress(place, reduction, reduction.displaced(solution))
-    return found.value, found.uncertainty
+def read_place(place: Place, reduction: Reduction, solution: Solution) -> Reading:
+    """Read a quantity at a place, with its uncertainty [stress].
+
+    The uncertainty of a pressure is what the nodal values scatter about the linear function through them.
+
+    Parameters
+    ----------
+    place
+        The quantity.
+    reduction
+        The reduced scene.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    Reading
+        The stress or the pressure. Where no contact near the place touches, it says that there is no pressure.
+
+    Raises
+    ------
+    InputError
+        As read_stress() and pressure_weights().
+    """
+    if place.kind != "pressure":
+        found = read_stress(place, reduction, reduction.displaced(solution))
+        return Reading(found.value, found.uncertainty, found.peaks)
+    weights, problem = pressure_weights(place, reduction), reduction.problem
+    near = np.flatnonzero(weights[:, 0])
+    value = float(np.sum(weights * solution.reactions))
+    pressure = solution.reactions[near, 0] / problem.areas[near]
+    missing = ""
+    if not problem.law.pressed(solution.reactions)[near].any():
+        point = ", ".join(f"{x:g}" for x in place.region.point)
+        apart = problem.displacements(solution.reactions, solution.multipliers)[near, 0].min()
+        missing = f"there is no contact at ({point}): the surfaces are {apart:.3g} apart there"
+    share = weights[near, 0] * problem.areas[near]
+    scatter = (
+        float(np.abs(pressure - value) @ np.abs(share))
+        if len(near) < 3
+        else float(np.sqrt(np.sum(_left(problem.coordinates[:, near], pressure) ** 2) * np.sum(share**2)))
+    )
+    noise = solution.residual * float(np.linalg.norm(solution.reactions) / problem.areas[near].min())
+    at = problem.coordinates[:, near[0]]
+    size = float(np.ptp(problem.coordinates[:, near], axis=1).max())
+    return Reading(value, scatter + noise, (Peak(value, scatter, at, size, near),), missing)
+
+
+def _left(points: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """What a linear function through values (m,) at points (dim, m) leaves of them."""
+    terms = np.vstack([np.ones(points.shape[1]), points - points.mean(axis=1, keepdims=True)]).T
+    return np.asarray(values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0])

@@ -36,24 +36,52 @@ def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
     """
     if not solution.solved:
         return ()
+    few = [
+        f"too few contacts of '{name}' touch, {len(own)} of {count}, to show how the pressure is distributed: "
+        "refine the meshes there, or ask for an accuracy."
+        for (name, count), own in coarse(reduction, solution)
+    ]
+    return (*few, *_at_rims(reduction, solution))
+
+
+def _at_rims(reduction: Reduction, solution: Solution) -> list[str]:
+    """Sentences on contacts that touch where the other surface ends and covers a part of their faces."""
     found = []
     for (view, own), coupling in zip(views(reduction, solution), reduction.couplings):
-        problem, name = view.problem, view.problem.pairs[0].name
-        touches = contact_status(problem, own.reactions).touching
-        touching = int(touches.sum())
-        if coupling.share is not None and np.any(rim := touches & (coupling.share < COVERED)):
-            least = np.argmin(np.where(rim, coupling.share, 1.0))
-            where = ", ".join(f"{c:.4g}" for c in coupling.positions[:, least])
-            found.append(
-                f"{rim.sum()} contacts of '{name}' touch at the rim of the other surface, which covers "
-                f"only a part of their faces, as little as {coupling.share[least]:.0%} near ({where}): "
-                "their pressure is the force over that part."
-            )
+        touches = contact_status(view.problem, own.reactions).touching
+        if coupling.share is None or not np.any(rim := touches & (coupling.share < COVERED)):
+            continue
+        least = np.argmin(np.where(rim, coupling.share, 1.0))
+        where = ", ".join(f"{c:.4g}" for c in coupling.positions[:, least])
+        found.append(
+            f"{rim.sum()} contacts of '{view.problem.pairs[0].name}' touch at the rim of the other surface, "
+            f"which covers only a part of their faces, as little as {coupling.share[least]:.0%} near ({where}): "
+            "their pressure is the force over that part."
+        )
+    return found
+
+
+def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, int], np.ndarray]]:
+    """Find the pairs of surfaces whose zone of contact is smaller than the mesh can show.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    list
+        Name and number of contacts of each such pair, with the numbers of those that touch.
+    """
+    found = []
+    for (view, own), pair in zip(views(reduction, solution), reduction.problem.pairs):
+        problem = view.problem
+        touching = np.flatnonzero(contact_status(problem, own.reactions).touching)
         images = 2 ** int(np.sum(problem.chart.mirrored))
         strip = 2 * FEWEST if problem.dim == 2 else np.pi * FEWEST**2
-        if 0 < touching < problem.contacts and touching * images < strip:
-            found.append(
-                f"too few contacts of '{name}' touch, {touching} of {problem.contacts}, to show how the pressure is distributed: "
-                "refine the meshes there, or ask for an accuracy."
-            )
-    return tuple(found)
+        if 0 < len(touching) < problem.contacts and len(touching) * images < strip:
+            found.append(((pair.name, problem.contacts), touching + pair.start))
+    return found

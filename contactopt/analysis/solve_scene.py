@@ -2,7 +2,7 @@
 
 Whatever solves scenes is a loop around the two functions of this module. solve_scene() begins with a scene. solve_loaded() goes
 on with the same bodies under other loads. contactopt.analysis.zone remeshes to the contact zone, contactopt.analysis.paths
-follows a load path, and contactopt.analysis.accuracy refines meshes around both.
+follows a load path, and contactopt.accuracy refines meshes around both.
 """
 
 from __future__ import annotations

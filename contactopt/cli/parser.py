@@ -6,7 +6,7 @@ import argparse
 
 import contactopt
 from contactopt.analysis.places import PLACED
-from contactopt.analysis.quantities import QUANTITIES
+from contactopt.analysis.quantities import READINGS
 from contactopt.benchmark.keys import help_text
 from contactopt.bodies.solvers import SOLVERS
 from contactopt.cli import commands
@@ -169,7 +169,7 @@ def _run(run: argparse.ArgumentParser) -> None:
         "--quantity",
         metavar="NAME",
         help="the quantity of --accuracy: "
-        + ", ".join((*QUANTITIES, *PLACED))
+        + ", ".join((*READINGS, *PLACED))
         + "; NAME:PAIR is that of one pair of surfaces",
     )
     run.add_argument(

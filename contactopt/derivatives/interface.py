@@ -97,7 +97,9 @@ class Sensitivity:
     def tangent(self) -> Tangent:
         """The matrix M, dimensionless."""
         scaled, scales = self._scaled
-        return Tangent(scaled, self._rho * scales.length / scales.force, _slopes(self.problem, self._point))
+        # On a plane of symmetry friction holds nothing, since nothing moves: its force is zero.
+        D = self._moves[:, :, None] * _slopes(self.problem, self._point)
+        return Tangent(scaled, self._rho * scales.length / scales.force, D)
 
     @cached_property
     def weak(self) -> tuple[Weak, ...]:

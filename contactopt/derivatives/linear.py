@@ -35,6 +35,7 @@ from contactopt.solving.kernels.krylov import model_of
 from contactopt.solving.preconditioners import Preconditioner
 
 SINGULAR = 1e-13  # reciprocal condition of K below which it counts as singular
+UNSEEN = 1e-8  # relative residual up to which a singular system counts as solved
 ACCURACY = 1e-11  # relative residual of an iterative solve
 ROUNDS = 12  # of GMRES, which gain four digits each
 RESTART, CYCLES = 60, 3  # of GMRES
@@ -182,13 +183,22 @@ class Dense:
         size = np.linalg.norm(K, np.inf) if n + p else 0.0
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", la.LinAlgWarning)
-            # The transpose of a C array is what LAPACK factorises in place.
-            self.factors = la.lu_factor(K.T, overwrite_a=True, check_finite=False)
-        if n + p and not la.lapack.dgecon(self.factors[0], size)[0] > SINGULAR:
-            raise InputError(UNIQUE)
+            self.factors = la.lu_factor(K.T, check_finite=False)
+        regular = not n + p or la.lapack.dgecon(self.factors[0], size)[0] > SINGULAR
+        self.singular = None if regular else K
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
+        if self.singular is not None:
+            return _consistent(self.singular.T if transposed else self.singular, right)
         return np.asarray(la.lu_solve(self.factors, right, trans=int(not transposed), check_finite=False))
+
+
+def _consistent(K: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The least solution of a singular system whose right side does not see what is undetermined; InputError for others."""
+    x = la.lstsq(K, right, cond=UNSEEN, check_finite=False)[0]
+    if np.linalg.norm(K @ x - right) > UNSEEN * np.linalg.norm(right):
+        raise InputError(UNIQUE)
+    return np.asarray(x)
 
 
 class Sparse:

@@ -9,8 +9,12 @@
     energy                       elastic energy of all bodies [force length]
     pressure, width, stick       the smooth readings of contactopt.analysis.quantities; of one pair of several pressure:PAIR
 
-A largest stress has the derivative of the stress at the place where it is largest. The last three are formulas over many forces. Their derivative by the force at each closed contact is a central
-difference of the reading, which solves nothing; what the parameters do to the forces is exact.
+ROWS has one row for each. What it makes, a Quantity, is all that is known of it: how it is read, with its uncertainty and its
+local maxima (contactopt.analysis.quantities, contactopt.analysis.places), and its slopes.
+
+A largest stress has the derivative of the stress at the place where it is largest. Pressure, width and stick are formulas over
+several forces. Their derivative by the force at each closed contact is a central difference of the reading, which solves
+nothing; what the parameters do to the forces is exact.
 """
 
 from __future__ import annotations
@@ -23,16 +27,23 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.edges import contact_edge, stick_edge
-from contactopt.analysis.places import PLACED, Place, map_of, place_of, pressure_weights, read_stress
-from contactopt.analysis.quantities import QUANTITIES, elastic_energy
+from contactopt.analysis.places import PLACED, Place, map_of, place_of, pressure_weights, read_place, read_stress
+from contactopt.analysis.quantities import (
+    OF_ONE_PAIR,
+    READINGS,
+    Reading,
+    elastic_energy,
+    value_of,
+)
 from contactopt.analysis.resultants import planes_of, views
 from contactopt.derivatives.parameters import MATERIAL, Parameter
 from contactopt.derivatives.states import Seeds, Step
 from contactopt.errors import InputError
+from contactopt.interface.reduction import Reduction
+from contactopt.problem import Solution
 from contactopt.problem.laws import Law
+from contactopt.scenes.scene import Scene
 
-READINGS = ("pressure", "width", "stick")
-LINEAR = ("approach", "shift", "normal_force", "shear_force")
 STEP = 1e-5  # of a reading's central differences, over the force at the contact
 MOST = 3000  # contacts at which a reading is differentiated
 
@@ -53,6 +64,63 @@ class Functional:
                 f"the weights of a functional must have the shape {step.problem.q.shape}; got {weights.shape}."
             )
         return Seeds(float(np.sum(weights * step.solution.reactions)), reactions=weights)
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """One quantity of one scene: how it is read, how uncertain that is, and its slopes.
+
+    name    as it was asked for
+    slopes  step -> Seeds: its value and its derivatives by what a state holds
+    reader  (reduction, solution) -> Reading: value, uncertainty, local maxima; None: the value of the slopes
+    nodal   whether it means another thing on the next mesh
+    """
+
+    name: str
+    slopes: Callable[[Step], Seeds]
+    reader: Callable[[Reduction, Solution], Reading] | None = None
+    nodal: bool = False
+
+    def read(self, reduction: Reduction, solution: Solution) -> Reading:
+        """Read it from a solution of a reduced scene; InputError where the scene does not have it."""
+        if self.reader is not None:
+            return self.reader(reduction, solution)
+        return Reading(self.slopes(Step(reduction, reduction.problem, solution)).value)
+
+
+def find_quantity(name: Any, scene: Scene) -> Quantity:
+    """Find a quantity by its name, before anything is solved.
+
+    Parameters
+    ----------
+    name
+        A name from this module's head.
+    scene
+        The scene that is asked.
+
+    Returns
+    -------
+    Quantity
+        What reads it.
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity, and for a body, boundary, pair or place that the scene does not have.
+    """
+    if not isinstance(name, str):
+        raise InputError(f"a quantity is given by its name; got {name!r}.")
+    place = place_of(name, scene)
+    if place is not None:
+        return Quantity(name, partial(_at_place, place), partial(read_place, place))
+    kind, _, rest = name.partition(":")
+    row = ROWS.get(kind)
+    if row is None or (rest and not row[0]):
+        if row is not None and kind in READINGS:
+            raise InputError(f"the {kind} belongs to the whole scene; of one pair ask for {', '.join(OF_ONE_PAIR)}.")
+        known = ", ".join((*(f"{kind}{form}" for kind, (form, _) in ROWS.items()), *PLACED))
+        raise InputError(f"unknown quantity {name!r}; choose from {known}.")
+    return row[1](name, rest, scene)
 
 
 def seeds_of(quantity: Any, step: Step) -> Seeds:
@@ -77,32 +145,66 @@ def seeds_of(quantity: Any, step: Step) -> Seeds:
     """
     if callable(quantity):
         return quantity(step)
-    if not isinstance(quantity, str):
-        raise InputError(f"a quantity is given by its name; got {quantity!r}.")
-    place = place_of(quantity, step.reduction.scene)
-    if place is not None:
-        return (
-            Functional(pressure_weights(place, step.reduction))(step)
-            if place.kind == "pressure"
-            else _stress(step, place)
+    return find_quantity(quantity, step.reduction.scene).slopes(step)
+
+
+def _surface(name: str, rest: str, scene: Scene) -> Quantity:
+    """A reading of the forces on one pair of surfaces, or the pressure at one contact."""
+    kind = name.partition(":")[0]
+    if kind == "pressure" and rest.isdigit():
+        return Quantity(name, partial(_pressure_at, number=rest), nodal=True)
+    names = [pair.name for pair in scene.pairs]
+    if not rest and len(names) > 1:
+        raise InputError(
+            f"scene '{scene.name}' has {len(names)} pairs of surfaces, each with its own pressure and half-widths; name the "
+            f"pair, as in '{kind}:{names[0]}', or ask for the energy."
         )
-    kind, *rest = quantity.split(":")
-    if quantity == "stick":
-        return _stick(step)
-    if kind in ("pressure", "width") and (not rest or (len(rest) == 1 and not rest[0].isdigit())):
-        return _reading(kind, step, _pair(step, rest[0]) if rest else None)
-    if quantity == "energy":
-        return _energy(step)
-    if quantity in ("approach", "shift"):
-        return _motion(step, 0 if quantity == "approach" else 1)
-    if kind in ("normal_force", "shear_force") and len(rest) <= 1:
-        return _force(step, kind, rest[0] if rest else None)
-    if kind == "resultant" and len(rest) == 2:
-        return _resultant(step, *rest)
-    if kind == "pressure" and len(rest) == 1:
-        return _pressure_at(step, rest[0])
-    known = ", ".join((*LINEAR, *READINGS, "energy", "resultant:PAIR:COMPONENT", "pressure:CONTACT", *PLACED))
-    raise InputError(f"unknown quantity {quantity!r}; choose from {known}.")
+    if rest and rest not in names:
+        raise InputError(f"quantity {name!r}: there is no pair of surfaces {rest!r}; the pairs are {', '.join(names)}.")
+    number = names.index(rest) if rest else 0
+    slopes = _stick if kind == "stick" else partial(_reading, kind)
+    return Quantity(name, partial(slopes, pair=number), partial(_read_pair, kind, number))
+
+
+def _read_pair(kind: str, number: int, reduction: Reduction, solution: Solution) -> Reading:
+    """A reading of one pair of surfaces, with contacts numbered as in the whole scene."""
+    first = reduction.problem.pairs[number].start
+    found = READINGS[kind](*views(reduction, solution)[number])
+    return replace(found, peaks=tuple(replace(peak, contacts=peak.contacts + first) for peak in found.peaks))
+
+
+def _plain(slopes: Callable[[Step], Seeds]) -> Callable[[str, str, Scene], Quantity]:
+    """A row whose quantity takes nothing but its name, and is read as in READINGS where it is there."""
+
+    def make(name: str, rest: str, scene: Scene) -> Quantity:
+        return Quantity(name, slopes, READINGS.get(name))
+
+    return make
+
+
+def _pair_force(name: str, rest: str, scene: Scene) -> Quantity:
+    _check_pair(rest or None, scene)
+    return Quantity(name, partial(_force, kind=name.partition(":")[0], pair=rest or None))
+
+
+def _pair_resultant(name: str, rest: str, scene: Scene) -> Quantity:
+    pair, _, component = rest.rpartition(":")
+    _check_pair(pair, scene)
+    if component not in scene.components:
+        raise InputError(f"there is no component {component!r}; use {', '.join(scene.components)}.")
+    return Quantity(name, partial(_resultant, pair=pair, component=component))
+
+
+def _check_pair(name: str | None, scene: Scene) -> None:
+    names = [pair.name for pair in scene.pairs]
+    if name is not None and name not in names:
+        raise InputError(f"there is no contact '{name}', only {', '.join(names)}.")
+
+
+def _at_place(place: Place, step: Step) -> Seeds:
+    if place.kind == "pressure":
+        return Functional(pressure_weights(place, step.reduction))(step)
+    return _stress(step, place)
 
 
 def _motion(step: Step, component: int) -> Seeds:
@@ -119,10 +221,7 @@ def _motion(step: Step, component: int) -> Seeds:
 def _pair(step: Step, name: str | None) -> slice:
     if name is None:
         return slice(0, step.problem.contacts)
-    for pair in step.problem.pairs:
-        if pair.name == name:
-            return pair.contacts
-    raise InputError(f"there is no contact '{name}', only {', '.join(pair.name for pair in step.problem.pairs)}.")
+    return next(pair.contacts for pair in step.problem.pairs if pair.name == name)
 
 
 def _force(step: Step, kind: str, pair: str | None) -> Seeds:
@@ -133,8 +232,6 @@ def _force(step: Step, kind: str, pair: str | None) -> Seeds:
 
 def _resultant(step: Step, pair: str, component: str) -> Seeds:
     scene = step.reduction.scene
-    if component not in scene.components:
-        raise InputError(f"there is no component {component!r}; use {', '.join(scene.components)}.")
     axis = np.eye(scene.dim)[scene.components.index(component)]
     for plane in planes_of(step.reduction):  # mirror images balance each other across it
         axis = axis - plane.inward * (plane.inward @ axis)
@@ -195,16 +292,14 @@ def _stress(step: Step, place: Place) -> Seeds:
         return float(np.sum(found.slopes * by_poisson.stress(U)))
 
     bodies = tuple(own if i == number else None for i in range(len(step.displaced)))
-    return Seeds(found.value, by_r, bodies=bodies, explicit=explicit, stress=found)
+    return Seeds(found.value, by_r, bodies=bodies, explicit=explicit)
 
 
-def _reading(name: str, step: Step, pair: slice | None) -> Seeds:
-    """A quantity of contactopt.analysis that reads the normal forces, of all contacts or one pair, at closed contacts."""
-    reduction, solution = replace(step.reduction, problem=step.problem), step.solution
-    if pair is not None:
-        number = [made.contacts for made in step.problem.pairs].index(pair)
-        reduction, solution = views(reduction, solution)[number]
-    read, r = QUANTITIES[name], solution.reactions
+def _reading(name: str, step: Step, pair: int) -> Seeds:
+    """A quantity of contactopt.analysis that reads the normal forces of one pair, at closed contacts."""
+    whole = replace(step.reduction, problem=step.problem)
+    reduction, solution = views(whole, step.solution)[pair]
+    read, r = partial(value_of, name), solution.reactions
     by_r = np.zeros(r.shape)
     for i in _few(name, np.flatnonzero(reduction.problem.law.pressed(r))):
 
@@ -214,19 +309,25 @@ def _reading(name: str, step: Step, pair: slice | None) -> Seeds:
             return read(reduction, replace(solution, reactions=there))
 
         by_r[i, 0] = _central(at, STEP * float(np.abs(r[i]).max()))
+    return Seeds(read(reduction, solution), _on_all(step, pair, by_r))
+
+
+def _on_all(step: Step, pair: int, own: np.ndarray) -> np.ndarray:
+    """Weights (k_i, dim) of the contacts of one pair among all contacts (k, dim)."""
     whole = np.zeros(step.problem.q.shape)
-    whole[pair or slice(None)] = by_r
-    return Seeds(read(reduction, solution), whole)
+    whole[step.problem.pairs[pair].contacts] = own
+    return whole
 
 
-def _stick(step: Step) -> Seeds:
+def _stick(step: Step, pair: int) -> Seeds:
     """Half-width of the stick zone over that of contact, differentiated where contacts stay open, stick or slip as they do.
 
     It depends on the forces at closed contacts, on the slip of the step, and on the friction bound. A contact that slips
     stays at its bound: its tangential force changes with the normal one, and may turn.
     """
-    scene, problem, r = step.reduction.scene, step.problem, step.solution.reactions
-    u = problem.displacements(r, step.solution.multipliers)
+    reduction, solution = views(replace(step.reduction, problem=step.problem), step.solution)[pair]
+    scene, problem, r = reduction.scene, reduction.problem, solution.reactions
+    u = problem.displacements(r, solution.multipliers)
     sticks, slips = problem.law.sticking(r), problem.law.slipping(r)
     across = np.stack([-r[:, 2], r[:, 1]], axis=1) if problem.dim == 3 else None
 
@@ -263,7 +364,7 @@ def _stick(step: Step) -> Seeds:
     def explicit(which: Parameter) -> float:
         if which.kind != "mu":
             return 0.0
-        change = step.law_change(which)
+        change = step.law_change(which)[step.problem.pairs[pair].contacts]
 
         def at(h: float) -> float:
             law, there = problem.law.shifted(h * change), r.copy()
@@ -274,7 +375,8 @@ def _stick(step: Step) -> Seeds:
 
         return _central(at, STEP * float(problem.law.bound(np.ones(len(r))).max(initial=0.0)))
 
-    return Seeds(read(r, u, problem.law), by_r, slip=by_u, explicit=explicit)
+    slip = _on_all(step, pair, by_u)
+    return Seeds(read(r, u, problem.law), _on_all(step, pair, by_r), slip=slip, explicit=explicit)
 
 
 def _few(name: str, contacts: np.ndarray) -> np.ndarray:
@@ -285,3 +387,15 @@ def _few(name: str, contacts: np.ndarray) -> np.ndarray:
 
 def _central(function: Callable[[float], float], step: float) -> float:
     return (function(step) - function(-step)) / (2 * step)
+
+
+# kind of a quantity -> what may follow its name, and a function of name, what follows, and scene
+ROWS: dict[str, tuple[str, Callable[[str, str, Scene], Quantity]]] = {
+    **{kind: ("[:PAIR]" if kind in OF_ONE_PAIR else "", _surface) for kind in READINGS},
+    "approach": ("", _plain(partial(_motion, component=0))),
+    "energy": ("", _plain(_energy)),
+    "shift": ("", _plain(partial(_motion, component=1))),
+    "normal_force": ("[:PAIR]", _pair_force),
+    "shear_force": ("[:PAIR]", _pair_force),
+    "resultant": (":PAIR:COMPONENT", _pair_resultant),
+}

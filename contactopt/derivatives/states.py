@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 
 from contactopt.analysis.paths import PathResult
-from contactopt.analysis.places import StressReading
 from contactopt.checks import real_array
 from contactopt.derivatives.interface import Change, Dual, Sensitivity, sensitivity
 from contactopt.derivatives.kinks import Weak
@@ -44,7 +43,7 @@ class Seeds:
 
     reactions (k, dim), multipliers (p,), displacements (k, dim) of u, slip (k, dim) of u measured from the state before,
     bodies: (n,) by U of each body at fixed forces and
-    multipliers;  explicit: by a scalar parameter at fixed forces, multipliers and displacements;  stress: the reading of a stress
+    multipliers;  explicit: by a scalar parameter at fixed forces, multipliers and displacements
     """
 
     value: float
@@ -54,7 +53,6 @@ class Seeds:
     slip: Any = None
     bodies: tuple[Any, ...] = ()
     explicit: Callable[[Parameter], float] = field(default=lambda which: 0.0)
-    stress: StressReading | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,7 +359,9 @@ def chain_of(result: Any, distance: float | None = None) -> Chain:
                 "a derivative needs a solved scene: what contactopt.run or contactopt.follow returns; "
                 f"got {type(result).__name__}."
             )
+        _check_here(reduction)
         return Chain((Step(reduction, reduction.problem, solution, distance),))
+    _check_here(path.reduction)
     steps = []
     for number, state in enumerate(path.states):
         reduction = path.reduction.loaded(state.scene)
@@ -370,6 +370,15 @@ def chain_of(result: Any, distance: float | None = None) -> Chain:
         if not state.solution.solved:
             raise InputError(f"state {number} of the path is not certified; a derivative needs all states solved.")
     return Chain(tuple(steps))
+
+
+def _check_here(reduction: Reduction) -> None:
+    """InputError if a body lives on another rank, which cannot be asked for derivatives."""
+    for body in reduction.bodies:
+        if not hasattr(body, "material_work"):
+            raise InputError(
+                f"body '{body.name}' lives on another rank, where no derivatives are taken; run on one rank."
+            )
 
 
 def _one_per_contact(which: Parameter, amount: Any, contacts: int) -> np.ndarray:

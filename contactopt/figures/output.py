@@ -82,11 +82,9 @@ def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
 
         save(path_figure(result.path), "path")
     if result.estimate is not None:
-        from contactopt.adaptivity.loop import AdaptedEstimate
         from contactopt.figures.refinement import refinement_figure
 
-        if isinstance(result.estimate, AdaptedEstimate):
-            save(refinement_figure(result.estimate), "refinement")
+        save(refinement_figure(result.estimate), "refinement")
 
 
 def write(result: Result, folder: Path, states: bool) -> None:

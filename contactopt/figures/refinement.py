@@ -9,17 +9,17 @@ import numpy as np
 from contactopt.figures.style import BLUE, GREY, ORANGE
 
 if TYPE_CHECKING:
-    from contactopt.adaptivity.loop import AdaptedEstimate
+    from contactopt.accuracy.estimate import Estimate
 
 
-def refinement_figure(estimate: AdaptedEstimate) -> Any:
+def refinement_figure(estimate: Estimate) -> Any:
     """Two axes over the unknowns of each mesh: estimated errors, on logarithmic axes with the target, and the value.
 
     The dotted line is the last value with its estimated error added.
 
     Parameters
     ----------
-    estimate : what contactopt.adaptivity.refine_locally found
+    estimate : what contactopt.accuracy.refine found
     """
     from matplotlib.figure import Figure
     from matplotlib.ticker import NullFormatter
@@ -27,7 +27,7 @@ def refinement_figure(estimate: AdaptedEstimate) -> Any:
     figure = Figure(figsize=(9.6, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     unknowns = np.array([level.unknowns for level in estimate.levels])
-    errors = np.array([level.error for level in estimate.levels])
+    errors = np.array([np.nan if level.error is None else level.error for level in estimate.levels])
     energy = np.array([level.energy_error for level in estimate.levels])
     left.loglog(unknowns, errors, "o-", color=BLUE, label=f"of {estimate.quantity}")
     if np.any(energy > 0):
@@ -36,9 +36,10 @@ def refinement_figure(estimate: AdaptedEstimate) -> Any:
     left.set(xlabel="unknowns [-]", ylabel="estimated relative error [-]", title=f"{len(unknowns)} meshes")
     left.legend(frameon=False)
     values = np.array([level.value for level in estimate.levels])
-    bar = errors * np.abs(values)
+    bar = np.nan_to_num(errors) * np.abs(values)
     right.errorbar(unknowns, values, bar, fmt="o-", color=BLUE, capsize=3)
-    right.axhline(estimate.extrapolated, color=GREY, lw=1, ls=":")
+    if estimate.extrapolated is not None:
+        right.axhline(estimate.extrapolated, color=GREY, lw=1, ls=":")
     right.set(xscale="log", xlabel="unknowns [-]", ylabel=estimate.quantity, title="value, with the estimated error")
     right.set_ylim(*_shown(values, bar))
     for axes in (left, right):

@@ -30,7 +30,7 @@ ROOMS = {
     "runner": "One call leads from a scene to its solution, its figures and its files.",
     "benchmark": "Campaigns run methods on problems, each run in a process of its own, and write tables and reports.",
     "figures": "Results are drawn here.",
-    "adaptivity": "Meshes are refined where the quantity asked for needs it.",
+    "accuracy": "Meshes are refined until the estimated error of the quantity asked for is small enough.",
     "derivatives": "Solutions are differentiated here; parameters are fitted to data, profiles and loads are designed.",
     "analysis": "Questions about solved scenes are answered here: the contact zone, accuracy, load paths, diagnosis.",
     "interface": "The bodies become one interface problem here, and its solution becomes displacements and stresses.",

@@ -10,8 +10,8 @@ from multiprocessing import get_context
 import numpy as np
 
 from contactopt import scenes
-from contactopt.analysis.accuracy import refine
-from contactopt.analysis.quantities import QUANTITIES
+from contactopt.accuracy import refine
+from contactopt.analysis.quantities import value_of
 from contactopt.analysis.zone import solve_zone
 from contactopt.analytic import contact_modulus
 from contactopt.bodies.refinement import split_scene
@@ -57,9 +57,9 @@ def hertz(name: str, elements: int) -> dict[str, object]:
         "elements": elements,
         "unknowns": reduction.dofs,
         "zone rounds": len(zones) - 1,
-        "peak, fitted": QUANTITIES["pressure"](reduction, solution) / truth["pressure"] - 1,
+        "peak, fitted": value_of("pressure", reduction, solution) / truth["pressure"] - 1,
         "peak, largest node": nodal / truth["pressure"] - 1,
-        "width": QUANTITIES["width"](reduction, solution) / truth["width"] - 1,
+        "width": value_of("width", reduction, solution) / truth["width"] - 1,
     }
 
 
@@ -89,8 +89,8 @@ def effectivity(scene: Scene, quantity: str, target: float) -> dict[str, object]
         "reached": estimate.reached,
         "extrapolated": estimate.extrapolated / exact(scene)[quantity] - 1,
         "solves": len(estimate.levels),
-        "unknowns": solved.level.unknowns,
-        "seconds": sum(level.seconds for level in estimate.levels),
+        "unknowns": solved.reduction.dofs,
+        "seconds": estimate.levels[-1].seconds,
     }
 
 
@@ -125,9 +125,9 @@ def finite(size: float) -> dict[str, object]:
         reduction, solution = solved.reduction, solved.solution
         for quantity in ("pressure", "width", "approach") if name == "point" else ("pressure", "width"):
             if name != "strip":
-                row[f"{name}, {quantity}"] = QUANTITIES[quantity](reduction, solution)
+                row[f"{name}, {quantity}"] = value_of(quantity, reduction, solution)
         if name == "strip":
-            row["strip, c / a"] = QUANTITIES["stick"](reduction, solution)
+            row["strip, c / a"] = value_of("stick", reduction, solution)
         else:
             row[f"{name}, unknowns"] = reduction.dofs
     row["seconds"] = time.perf_counter() - begin
@@ -156,7 +156,7 @@ def stick(kind: str, mu: float) -> dict[str, object]:
     scene = scenes.rigid_punch(kind, mu=mu)
     solved = solve_zone(scene)
     reduction, solution = solved.reduction, solved.solution
-    ratio, truth = QUANTITIES["stick"](reduction, solution), exact(scene)["stick"]
+    ratio, truth = value_of("stick", reduction, solution), exact(scene)["stick"]
     return {
         "scene": scene.name,
         "mu": mu,
@@ -177,7 +177,7 @@ def locking(nu: float, mu: float) -> dict[str, object]:
         reduction, solution = solved.reduction, solved.solution
         row |= {
             f"{name}, unknowns": reduction.dofs,
-            f"{name}, error": QUANTITIES["stick"](reduction, solution) - exact(scene)["stick"],
+            f"{name}, error": value_of("stick", reduction, solution) - exact(scene)["stick"],
         }
     return row
 
@@ -196,7 +196,7 @@ def sphere() -> list[dict[str, object]]:
     scene, best = scenes.sphere(), None
     for _ in range(5):
         _, estimate = refine([scene], "pressure", 1e-2)
-        seconds = sum(level.seconds for level in estimate.levels)
+        seconds = estimate.levels[-1].seconds
         if best is None or seconds < best[0]:
             best = seconds, estimate
     assert best is not None
@@ -229,7 +229,7 @@ def parsimony(kind: str) -> dict[str, list[dict[str, float]]]:
                     solved = solve_zone(scene, elements)
                     reduction, solution = solved.reduction, solved.solution
                     seconds = min(seconds, time.perf_counter() - begin)
-                errors = [abs(QUANTITIES[q](reduction, solution) / truth[q] - 1) for q in ("pressure", "width")]
+                errors = [abs(value_of(q, reduction, solution) / truth[q] - 1) for q in ("pressure", "width")]
                 row = {"elements": elements, "unknowns": reduction.dofs, "seconds": seconds}
                 curves.setdefault(name, []).append(row | {"pressure": errors[0], "width": errors[1]})
     return curves

@@ -5,7 +5,6 @@
                    exact peak pressure, refined locally and everywhere
     hertz3d        a ball on a block, tetrahedra by Gmsh without knowledge of the contact: the peak pressure
     stress         the largest stress of parts meshed by Gmsh: unknowns and time for 1 %, refined locally and everywhere
-    effectivity    estimated error over true error on many scenes and quantities, the truth from much finer meshes
 
 Run all, or the parts that are named: python -m experiments.questions.adaptivity [PART ...]
 """
@@ -28,12 +27,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import Material, Part, Plate, Scene, Support, analytic, load_mesh
-from contactopt.adaptivity import refine_locally
+from contactopt.accuracy import refine
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.quantities import peak_pressure
 from contactopt.analysis.solve_scene import solve_scene
 from contactopt.scenes import make_scene
-from experiments.questions.adaptivity.parts import bearing, bracket, pin_in_bush
 from experiments.questions.adaptivity.stress import hertz3d, locally, stress
 from experiments.report import REPORTS, write
 
@@ -49,9 +47,13 @@ def slope(x: list[float], y: list[float]) -> float:
 def orders() -> list[dict[str, Any]]:
     """Error in the energy norm of the flat punch, as the square root of the missing energy over the whole energy."""
     rows = []
-    truth = refine_locally(make_scene("punch-2d", degree=2), "energy", 2e-7, limits=Limits(60_000))[1].extrapolated
+    truth = refine([make_scene("punch-2d", degree=2)], "energy", 2e-7, limits=Limits(60_000), adaptive=True)[
+        1
+    ].extrapolated
     for degree, goal in ((1, 4e-4), (2, 3e-6)):
-        estimate = refine_locally(make_scene("punch-2d", degree=degree), "energy", goal, limits=Limits(100_000))[1]
+        estimate = refine(
+            [make_scene("punch-2d", degree=degree)], "energy", goal, limits=Limits(100_000), adaptive=True
+        )[1]
         kept = [level for level in estimate.levels if 1_000 <= level.unknowns <= 100_000]
         errors = [np.sqrt(abs(1 - level.value / truth)) for level in kept]
         rows += [
@@ -191,82 +193,11 @@ def _reached(how: str, degree: int, bound: float, found: list[tuple[int, float, 
         }
 
 
-def stamp(height: float) -> Scene:
-    """A stubby stamp with a shoulder, meshed by unstructured triangles, on a block; both corners are re-entrant or sharp."""
-    import gmsh
-
-    gmsh.initialize(interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    gmsh.option.setNumber("Mesh.MeshSizeMax", 3.0)
-    occ = gmsh.model.occ
-    head, foot = (2, occ.addRectangle(-10, 5, 0, 20, height)), (2, occ.addRectangle(-4, 0, 0, 9, 5))
-    body, _ = occ.fuse([head], [foot])
-    occ.synchronize()
-    gmsh.model.addPhysicalGroup(2, [tag for _, tag in body], name="stamp")
-    sides: dict[str, list[int]] = {}
-    for _, curve in gmsh.model.getBoundary(body, oriented=False):
-        _, y, _ = occ.getCenterOfMass(1, curve)
-        side = "foot" if y < 1e-6 else "top" if y > 5 + height - 1e-6 else "side"
-        sides.setdefault(side, []).append(curve)
-    for side, curves in sides.items():
-        gmsh.model.addPhysicalGroup(1, curves, name=side)
-    gmsh.model.mesh.generate(2)
-    with TemporaryDirectory() as name:
-        gmsh.write(f"{name}/stamp.msh")
-        mesh = load_mesh(Path(name) / "stamp.msh")
-    gmsh.finalize()
-    upper = Part("stamp", mesh, STEEL, loads=(Plate("top", {"x": 50.0, "y": -500.0}),), contact="foot")
-    from contactopt.scenes.meshes import rename, tensor_mesh
-
-    ground = rename(tensor_mesh(np.linspace(-20, 20, 11), np.linspace(-15, 0, 5)), bottom="y-", top="y+")
-    lower = Part("block", ground, Material(70e3, 0.33), (Support("bottom"),), contact="top")
-    return Scene("stamp", upper, lower, 0.3)
-
-
-def effectivity() -> list[dict[str, Any]]:
-    """Estimated over true error, each scene and quantity at three accuracies."""
-    scenes: dict[str, tuple[Scene, tuple[str, ...]]] = {
-        "punch-2d": (make_scene("punch-2d"), ("energy", "approach")),
-        "cylinder-2d": (make_scene("cylinder-2d"), ("energy", "approach", "pressure")),
-        "sphere": (make_scene("sphere"), ("energy", "approach", "pressure")),
-        "pin-in-bush": (make_scene("pin-in-bush"), ("energy",)),
-        "press-fit": (make_scene("press-fit"), ("energy",)),
-        "cylinder from Gmsh": (cylinder(6.0, 1000.0)[0], ("energy", "approach", "pressure")),
-        "stamp from Gmsh": (stamp(8.0), ("energy", "approach")),
-        "tall stamp from Gmsh": (stamp(20.0), ("energy", "approach")),
-        "bracket on a block": (bracket(), ("von_mises:bracket:fillet", "stress_xx:block@20,-5", "energy")),
-        "bearing from files": (bearing(), ("von_mises:bearing:fillet", "stress_yy:bearing@0,20")),
-        "pin in a bush": (pin_in_bush(), ("von_mises:bush", "pressure@0,-20")),
-    }
-    rows = []
-    for name, (scene, quantities) in scenes.items():
-        for quantity in quantities:
-            best = refine_locally(scene, quantity, 1e-5, limits=Limits(30_000))[1]
-            truth, last = best.extrapolated, abs(best.value / best.extrapolated - 1)
-            errors = [level.value / truth - 1 for level in best.levels]
-            for n, (level, true) in enumerate(zip(best.levels, errors)):
-                if n == 0 or abs(true) <= 5 * last or level.unknowns >= 8_000:
-                    continue
-                rows.append(
-                    {
-                        "scene": name,
-                        "quantity": quantity,
-                        "unknowns": level.unknowns,
-                        "estimated": level.error,
-                        "true": true,
-                        "effectivity": level.error / abs(true),
-                        "passes through zero": bool(true * errors[n - 1] < 0 or true * errors[n + 1] < 0),
-                    }
-                )
-    return rows
-
-
 PARTS: dict[str, Callable[[], list[dict[str, Any]]]] = {
     "orders": orders,
     "hertz": hertz,
     "hertz3d": hertz3d,
     "stress": stress,
-    "effectivity": effectivity,
 }
 
 
@@ -286,17 +217,6 @@ def report(tables: dict[str, list[dict[str, Any]]]) -> None:
                     ),
                 }
             )
-    values = [row["effectivity"] for row in tables["effectivity"]]
-    good = sum(0.5 <= value <= 4 for value in values)
-    apart = [row["effectivity"] for row in tables["effectivity"] if not row["passes through zero"]]
-    fine = sum(0.5 <= value <= 4 for value in apart)
-    bearing_rows = [row for row in tables["effectivity"] if row["quantity"] == "von_mises:bearing:fillet"]
-    early = next(row["unknowns"] for row in bearing_rows if row["estimated"] <= 0.01)
-    late = next(
-        row["unknowns"]
-        for row in tables["stress"]
-        if (row["part"], row["degree"], row["refined"]) == ("bearing from files", 1, "adaptive")
-    )
     text = f"""{__doc__.split(chr(10))[0]}
 
 ## The flat punch and its corners
@@ -329,17 +249,7 @@ is the extrapolated value of local refinement with quadratic elements to an esti
 
 {{stress}}
 
-## Is the estimate honest?
-
-The effectivity is the estimated error over the true one. It lies between .5 and 4 for {good} of {len(values)} meshes. The true error is
-the difference to the extrapolated value of a much finer mesh of the same sequence. Where the value passes through the true one between
-two meshes, it has a small error by chance, of which no estimate knows. Without the meshes next to such a passage, {fine} of
-{len(apart)} lie between .5 and 4. The estimate is smaller than the true error for {sum(value < 1 for value in values)} meshes, and by more than a
-factor of two for {sum(value < 0.5 for value in values)} of them. So the estimate is no bound. All meshes of this table have linear elements and
-are compared with their own sequence. On the bearing the estimate for the fillet is below 1 % from {early} unknowns on, but {late}
-are needed until linear elements stay within 1 % of the reference of quadratic ones in the table above.
-
-{{effectivity}}
+Whether the estimates are true is measured by `python -m experiments.questions.first_meshes`.
 
 Error against time, of adaptive meshes and of other models of one scene, is measured by `python -m experiments.questions.simplest`.
 """

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from contactopt import Scene, analytic
-from contactopt.adaptivity import refine_locally
-from contactopt.adaptivity.loop import AdaptedEstimate, simplicial, with_bent_edges
+from contactopt.accuracy import Estimate, refine
+from contactopt.accuracy.marking import divisible, with_bent_edges
 from contactopt.analysis.limits import Limits
-from contactopt.analysis.places import place_of, read_place
-from contactopt.analysis.quantities import QUANTITIES
 from contactopt.analysis.solve_scene import Options, Solved, solve_scene
+from contactopt.derivatives.outputs import find_quantity
 from experiments.questions.adaptivity.parts import STEEL, ball, bearing, bracket, pin_in_bush
 
 BOUND = 0.01
@@ -38,17 +37,15 @@ CASES = {
 
 def read(solved: Solved, quantity: str) -> float:
     """A quantity of a solved scene."""
-    place = place_of(quantity, solved.reduction.scene)
-    if place is not None:
-        return read_place(place, solved.reduction, solved.solution)[0]
-    return QUANTITIES[quantity](solved.reduction, solved.solution)
+    asked = find_quantity(quantity, solved.reduction.scene)
+    return asked.read(solved.reduction, solved.solution).value
 
 
-def locally(scene: Scene, quantity: str, accuracy: float, most: int) -> tuple[list[Found], AdaptedEstimate]:
+def locally(scene: Scene, quantity: str, accuracy: float, most: int) -> tuple[list[Found], Estimate]:
     """The meshes of local refinement, with processor time, and the estimate."""
     begin, ends = time.process_time(), []
     options = Options(note=lambda text: ends.append(time.process_time() - begin) if "estimated error" in text else None)
-    _, estimate = refine_locally(scene, quantity, accuracy, options, Limits(most))
+    _, estimate = refine([scene], quantity, accuracy, options, Limits(most), adaptive=True)
     alone = [end - before for before, end in zip([0.0, *ends], ends)]
     return [(level.unknowns, level.value, *spent) for level, *spent in zip(estimate.levels, alone, ends)], estimate
 
@@ -57,7 +54,7 @@ def everywhere(case: Case, degree: int, truth: float) -> list[Found]:
     """Meshes of smaller and smaller elements everywhere, until two in turn are within the bound; without the time of Gmsh."""
     found: list[Found] = []
     for divided in range(case.most[degree] + 1):
-        scene = with_bent_edges(*simplicial(case.make(degree, divided)))
+        scene = with_bent_edges(*divisible(case.make(degree, divided), True))
         begin = time.process_time()
         solved = solve_scene(scene)
         value = read(solved, case.quantity)
@@ -90,7 +87,7 @@ def stress() -> list[dict[str, Any]]:
 def one_part(name: str) -> Iterator[dict[str, Any]]:
     """The rows of one part; the truth is the extrapolated value of a very fine mesh of quadratic elements."""
     case = CASES[name]
-    fine = refine_locally(case.make(2), case.quantity, 1e-4, limits=Limits(80_000))[1]
+    fine = refine([case.make(2)], case.quantity, 1e-4, limits=Limits(80_000), adaptive=True)[1]
     truth = fine.extrapolated
     for degree in (1, 2):
         local, _ = locally(case.make(degree), case.quantity, BOUND / 5, 40_000)

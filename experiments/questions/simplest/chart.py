@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import HalfSpace, Part, Rigid, Scene, Support, analytic, scenes
-from contactopt.adaptivity import refine_locally
+from contactopt.accuracy import refine
+from contactopt.analysis.limits import Limits
 from contactopt.analysis.quantities import peak_pressure
 from contactopt.analysis.solve_scene import solve_scene
 from contactopt.scenes.common import RUBBER
@@ -75,7 +76,7 @@ def solved(scene: Scene) -> Answer:
 def adaptive(goal: float, force: float) -> Answer:
     """The last of the meshes that refinement makes, from a coarse one on; the time is that of all of them."""
     coarse = tensor_mesh(np.linspace(-SIZE, SIZE, 17), np.linspace(-SIZE, 0, 9))
-    found, estimate = refine_locally(block(coarse, force), "pressure", goal, max_unknowns=60_000)
+    found, estimate = refine([block(coarse, force)], "pressure", goal, limits=Limits(60_000), adaptive=True)
     return found.reduction.dofs, estimate.value
 
 

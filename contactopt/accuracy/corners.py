@@ -13,54 +13,60 @@ Source: Williams (1952), Stress singularities resulting from various boundary co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.places import StressReading
-from contactopt.analysis.quantities import at_rim
+from contactopt.accuracy.estimate import Level
+from contactopt.analysis.quantities import Peak, Reading, at_rim
 from contactopt.analysis.resultants import views
 from contactopt.analysis.solve_scene import Solved
+from contactopt.bodies.curves import CORNER
 from contactopt.bodies.elements import straight
-from contactopt.bodies.local_refinement import CORNER, simplices
-
-if TYPE_CHECKING:
-    from contactopt.adaptivity.loop import AdaptedLevel
+from contactopt.bodies.local_refinement import simplices
 
 HALVED = 1.8  # by how much smaller elements must be for a level to count as the next one
+TRIED = 3  # meshes before a largest stress at a corner is taken for infinite
+RISE = 1.1  # by how much a stress at a corner has grown since the coarsest elements there
 STEADY = 0.8, 1.7  # share of the growth before that the next growth of a singular stress is
-GROWTHS = 4  # of the stress, one after the other, that are steady
+GROWTHS = 4  # one after the other, that are steady; a sharp rounding looks like a corner before it is resolved
+AT_EDGE = 2  # at a corner of the contact surface
 
 
-def unbounded(solved: Solved, quantity: str, stress: StressReading | None, levels: Sequence[AdaptedLevel]) -> str:
+def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
     """One sentence that says why no mesh bounds the quantity, or an empty text.
 
     Parameters
     ----------
     solved : on the last mesh
-    quantity : its name
-    stress : its reading, if it is a stress
+    reading : of the quantity there
     levels : all meshes so far
     """
-    if stress is not None:
-        if stress.vertex < 0:
-            return ""
-        place = ", ".join(f"{x:.4g}" for x in stress.place)
-        if re_entrant(stress.map.body.basis.mesh, stress.vertex):
+    if not levels[-1].place:
+        return ""
+    peak = reading.peaks[0]
+    place = ", ".join(f"{x:.4g}" for x in levels[-1].place)
+    if peak.body < 0:
+        if _grows(levels, AT_EDGE) and _at_rim(solved, peak):
+            return "the largest pressure is at the edge of the contact surface, a corner, where no mesh bounds it"
+        what = "pressure"
+    else:
+        what = "stress"
+        body: Any = solved.reduction.bodies[peak.body]  # the stress was read from its elements
+        mesh = straight(body.body.basis.mesh)
+        vertex = int(np.argmin(np.linalg.norm(mesh.p - peak.place[:, None], axis=0)))
+        if len(levels) > TRIED and re_entrant(mesh, vertex) and _rises(levels):
             return f"the largest stress is at the re-entrant corner near ({place}), where it is infinite; no mesh bounds it"
-        if _grows(levels):
-            return (
-                f"the largest stress, at ({place}), grows with every refinement like an infinite one; no mesh bounds it"
-            )
-        return ""
-    kind, _, pair = quantity.partition(":")
-    if kind != "pressure" or "@" in quantity or pair.isdigit():
-        return ""
-    names = [made.name for made in solved.reduction.problem.pairs]
-    seen = views(solved.reduction, solved.solution)[names.index(pair) if pair else 0]
-    if at_rim(*seen):
-        return "the largest pressure is at the edge of the contact surface, a corner, where no mesh bounds it"
+    if _grows(levels, GROWTHS):
+        return f"the largest {what}, at ({place}), grows with every refinement like an infinite one; no mesh bounds it"
     return ""
+
+
+def _at_rim(solved: Solved, peak: Peak) -> bool:
+    """Whether a peak of the pressure lies at the edge of the contact surface of its pair."""
+    pairs = solved.reduction.problem.pairs
+    number = next(i for i, pair in enumerate(pairs) if pair.start <= peak.contacts[0] < pair.stop)
+    return at_rim(*views(solved.reduction, solved.solution)[number])
 
 
 def re_entrant(mesh: Any, vertex: int) -> bool:
@@ -90,17 +96,28 @@ def filled(cells: Any, vertex: int) -> float:
     return float(angles.sum() / (4 * np.pi))
 
 
-def _grows(levels: Sequence[AdaptedLevel]) -> bool:
-    """Whether the stress at the place where it is largest grows steadily as the elements there become smaller."""
+def _kept(levels: Sequence[Level]) -> list[float]:
+    """The values of the levels at the place of the last one, from fine to coarse, each for elements clearly larger."""
     last = levels[-1]
-    kept: list[AdaptedLevel] = []
+    kept: list[Level] = []
     for level in reversed(levels):
         if np.linalg.norm(np.subtract(level.place, last.place)) > 2 * level.size:
             break
         if not kept or level.size >= HALVED * kept[-1].size:
             kept.append(level)
-    growths = -np.diff([level.value for level in kept[: GROWTHS + 1]])
-    if len(growths) < GROWTHS or np.any(growths <= 0):
+    return [level.value for level in kept]
+
+
+def _rises(levels: Sequence[Level]) -> bool:
+    """Whether smaller elements there have made the value larger, by a tenth at least."""
+    kept = _kept(levels)
+    return len(kept) > 1 and kept[0] > RISE * kept[-1]
+
+
+def _grows(levels: Sequence[Level], count: int) -> bool:
+    """Whether the value at the place where it is largest grows steadily as the elements there become smaller."""
+    growths = -np.diff(_kept(levels)[: count + 1])
+    if len(growths) < count or np.any(growths <= 0):
         return False
     ratios = growths[:-1] / growths[1:]
     return bool(np.all((ratios >= STEADY[0]) & (ratios <= STEADY[1])))

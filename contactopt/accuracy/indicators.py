@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from contactopt.analysis.places import StressReading
 from contactopt.analysis.solve_scene import Solved
-from contactopt.derivatives.outputs import seeds_of
+from contactopt.derivatives.outputs import Quantity
 from contactopt.derivatives.states import Duals, Step
+from contactopt.errors import InputError
 from contactopt.interface.reduction import Reduction
 
+log = logging.getLogger(__name__)
 ENERGY = "energy"
+EDGES = "width", "stick"  # read from so many forces that their slopes cost more than a finer mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,14 +27,14 @@ class ElementErrors:
     bodies     for each body what its elements add (elements,), signed [unit of the quantity]; (0,) for a body without a mesh
     between    what of it comes from the pressure between contacts [unit of the quantity]
     energy     estimated error of the displacement in the energy norm, over the norm of the displacement [-]
-    stress     where the quantity is a stress: the reading of it
+    unsigned   whether there was no adjoint, so that the shares are those of the energy of the error
     """
 
     value: float
     bodies: tuple[np.ndarray, ...]
     energy: float
     between: float = 0.0
-    stress: StressReading | None = None
+    unsigned: bool = False
 
     @property
     def total(self) -> float:
@@ -51,49 +54,56 @@ class ElementErrors:
         chosen = np.zeros(len(sizes), dtype=bool)
         chosen[order[:count]] = True
         first = np.cumsum([0, *(len(part) for part in self.bodies)])
-        if self.stress is not None and self.stress.uncertainty > abs(self.total):
-            chosen[first[self.stress.body] + self.stress.doubtful] = True
         return tuple(np.flatnonzero(chosen[a:b]) for a, b in pairwise(first))
 
 
-def element_errors(solved: Solved, quantity: str) -> ElementErrors:
-    """What each element adds to the error of a quantity, estimated as in contactopt.adaptivity.
+def element_errors(solved: Solved, quantity: Quantity, value: float) -> ElementErrors:
+    """What each element adds to the error of a quantity, estimated as in contactopt.accuracy.
 
     Parameters
     ----------
     solved : a scene that was reduced and solved
-    quantity : a name of contactopt.derivatives.outputs. For "energy" no adjoint is needed: the energy of the error itself
-        is taken, without a sign
+    quantity : of the scene. For "energy" no adjoint is needed: the energy of the error itself is taken, without a sign.
+        The same serves, as a guide to the marking alone, for edges and where the adjoint problem has no solution
+    value : of the quantity
 
     Returns
     -------
     ElementErrors : signed shares of the error J - J_h
-
-    Raises
-    ------
-    InputError : for a quantity that the scene does not have
     """
     step = Step(solved.reduction, solved.reduction.problem, solved.solution)
-    seeds = seeds_of(quantity, step)
     bodies, displaced = solved.reduction.bodies, step.displaced
-    fields = displaced
-    if quantity != ENERGY:
-        dual = step.sensitivity.adjoint(
-            reactions=seeds.reactions, multipliers=seeds.multipliers, displacements=seeds.displacements
-        )
-        fields = Duals(step, dual, seeds.bodies).fields
-    found = [body.recovery_errors(U, U, W) for body, U, W in zip(bodies, displaced, fields)]
+    found = None
+    if quantity.name != ENERGY and not quantity.name.startswith(EDGES):
+        try:
+            seeds = quantity.slopes(step)
+            dual = step.sensitivity.adjoint(
+                reactions=seeds.reactions,
+                multipliers=seeds.multipliers,
+                displacements=_sum(seeds.displacements, seeds.slip),
+            )
+            found = Duals(step, dual, seeds.bodies).fields
+        except InputError as error:
+            log.info("%s: no adjoint, %s", quantity.name, error)
+    fields = displaced if found is None else found
+    shares = [body.recovery_errors(U, U, W) for body, U, W in zip(bodies, displaced, fields)]
     energy = sum(body.energy(U) for body, U in zip(bodies, displaced))
-    missing = sum(own.sum() for own, _ in found) / 2
+    missing = sum(own.sum() for own, _ in shares) / 2
     norm = float(np.sqrt(missing / energy)) if energy > 0 else 0.0
-    if quantity == ENERGY:
-        return ElementErrors(seeds.value, tuple(own / 2 for own, _ in found), norm)
-    errors, between = tuple(product for _, product in found), 0.0
+    if found is None:
+        own = tuple(own / 2 for own, _ in shares)
+        return ElementErrors(value, own, norm, unsigned=quantity.name != ENERGY)
+    errors, between = tuple(product for _, product in shares), 0.0
     if seeds.reactions is not None and not seeds.bodies:
-        shares = between_contacts(solved, seeds.reactions[:, 0])
-        errors = tuple(inside + share for inside, share in zip(errors, shares))
-        between = float(sum(share.sum() for share in shares))
-    return ElementErrors(seeds.value, errors, norm, between, seeds.stress)
+        added = between_contacts(solved, seeds.reactions[:, 0])
+        errors = tuple(inside + share for inside, share in zip(errors, added))
+        between = float(sum(share.sum() for share in added))
+    return ElementErrors(value, errors, norm, between)
+
+
+def _sum(*parts: np.ndarray | None) -> np.ndarray | None:
+    given = [part for part in parts if part is not None]
+    return sum(given[1:], given[0]) if given else None
 
 
 def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -1,0 +1,178 @@
+"""Meshes refined everywhere, made anew for more elements: the error is read from differences of nested solutions.
+
+Two numbers describe a mesh: `elements` across the contact half-width, which the scene's mesh functions receive, and
+`splits`: how often the mesh made for elements / 2^splits was then halved everywhere. Elements in the contact zone have the
+same size whatever the splits; away from it every split turns a growth g of the elements into sqrt(g), and it halves
+whatever size the mesh function holds fixed. The error is taken as one part that falls with each,
+
+    J(elements, splits) - J = A elements^-p + B 2^(-p' splits),
+
+both read from differences of nested solutions (Richardson): the first of the meshes for n, 2 n, 4 n elements, the
+second of the last of them and its split, measured anew on the mesh that it asks to split. Their sizes are added, the
+larger part is refined next. Orders are observed where there are three solutions, and held between 3/4 and 2 per degree of
+the displacement, the order of functionals of smooth solutions, or 2 where an edge is read, since the solution is not
+smooth there.
+
+Source: Roache (1998), Verification and Validation in Computational Science and Engineering, chapter 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from contactopt.accuracy.estimate import Judged, Level
+from contactopt.accuracy.indicators import EDGES
+from contactopt.analysis.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
+from contactopt.analysis.paths import solve_states
+from contactopt.analysis.quantities import Reading
+from contactopt.analysis.solve_scene import Options, Solved
+from contactopt.bodies.elements import is_curved
+from contactopt.bodies.refinement import split_scene
+from contactopt.scenes.scene import Part, Scene
+
+
+def best_order(quantity: str, degree: int) -> int:
+    """The highest order of convergence that is believed of a quantity."""
+    return 2 if quantity.startswith(EDGES) else 2 * degree
+
+
+def remainder(before: float | None, last: float, best: float) -> tuple[float, float | None]:
+    """Estimate how much a sequence still changes under further halving of the mesh.
+
+    The order is log2(before / last), held between SLOWEST and `best`, and the remaining differences form a geometric series.
+    A small last difference may be luck, so that the result is at least what order `best` leaves of the difference before.
+    Where the two differences have opposite signs, the result is as large as the last one, or a quarter of the one before.
+
+    Parameters
+    ----------
+    before, last : the last two differences of the sequence; `before` is None where there is only one
+    best : the largest order that is believed
+
+    Returns
+    -------
+    The sum of all further differences, with the sign of the last one, and the observed order, None if it is unknown.
+    """
+    order = None
+    size = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1)
+    if before and last and before / last < 0:
+        size = max(abs(last), abs(before) / 4)
+    elif before and last:
+        order = float(np.log2(before / last))
+        size = max(size, abs(last) / (2 ** np.clip(order, SLOWEST, best) - 1))
+    return float(np.copysign(size, last)), order
+
+
+def mesh_error(values: Sequence[float], best: float) -> tuple[float, float | None]:
+    """Signed error of the last value of nested meshes, infinite for a single one, and the observed order."""
+    steps = np.diff(values[-3:])
+    if not len(steps):
+        return np.inf, None
+    rest, order = remainder(steps[-2] if len(steps) > 1 else None, steps[-1], best)
+    return -rest, order
+
+
+def stuck(values: Sequence[float]) -> bool:
+    """Whether every halving of the mesh changes the value by as much as the one before."""
+    steps = np.diff(values)
+    return len(steps) > 2 and bool(np.all(steps[-2:] * np.sign(steps[-1]) > 2**-STUCK * np.abs(steps[-3:-1])))
+
+
+class Everywhere:
+    """The nested solves of scenes whose parts make their own meshes.
+
+    values   (elements, splits) -> value;   changes  changes[i] is the change of the value by split i + 1. There is one
+             entry for every split of the present mesh; without one there is still the first, measured to learn what it does
+    """
+
+    def __init__(self, states: tuple[Scene, ...], quantity: str, options: Options):
+        self.states, self.options = states, options
+        scene = states[-1]
+        self.name, self.best = quantity, best_order(quantity, scene.degree)
+        self.usual = MOST_UNKNOWNS[scene.dim]
+        self.first = max(FIRST[scene.dim], scene.elements // BELOW)
+        made = [part.build_mesh(self.first, scene.zone) for part in scene.parts if isinstance(part, Part)]
+        self.halved = scene.dim == 2 and not any(is_curved(mesh) for mesh in made)  # what split() can halve
+        self.values: dict[tuple[int, int], float] = {}
+        self.unknowns: dict[tuple[int, int], int] = {}
+        self.changes: list[float] = []
+        self.splits = 0
+        self.jobs = [(self.first, 0)]
+        self.last: Solved | None = None
+
+    @property
+    def meshes(self) -> list[float]:
+        """The values of the main sequence, doubled elements without splits."""
+        return [value for (_, splits), value in sorted(self.values.items()) if splits == 0]
+
+    @property
+    def finest(self) -> int:
+        return max(elements for elements, _ in self.values)
+
+    def solve(self) -> Solved:
+        """Solve the next mesh."""
+        elements, splits = self.jobs[0]
+        self.options.note(f"{elements} elements across the half-width" + (f", {splits} splits" if splits else ""))
+        states = [split_scene(scene, elements // 2**splits, splits) for scene in self.states]
+        return solve_states(states, elements, self.options, self.last)
+
+    def judge(self, solved: Solved, reading: Reading, levels: Sequence[Level]) -> Judged:
+        """What is known of the error of the value on the mesh that was solved last."""
+        elements, splits = job = self.jobs.pop(0)
+        self.values[job], self.unknowns[job] = reading.value, solved.reduction.dofs
+        if splits:
+            self.changes[splits - 1 :] = [reading.value - self.values[elements, splits - 1]]
+            self.splits = splits
+        if splits == 0 or self.last is None:
+            self.last = solved
+        mesh, order = mesh_error(self.meshes, self.best)
+        grading = 0.0
+        if self.changes:
+            before = self.changes[-2] if len(self.changes) > 1 else None
+            grading = -remainder(before, self.changes[-1], self.best)[0] - sum(self.changes[splits:])
+        return Judged(abs(mesh) + abs(grading), mesh, grading, order)
+
+    def vain(self) -> str:
+        """One sentence that says why further refinement would be in vain, or an empty text."""
+        if stuck(self.meshes):
+            return f"the {self.name} does not converge: every refinement changes it by as much as the one before"
+        return ""
+
+    @property
+    def ready(self) -> bool:
+        """Whether enough is known for the target to count as reached."""
+        return not self.jobs and len(self.meshes) > 2 and (not self.halved or bool(self.changes))
+
+    def facts(self, solved: Solved) -> dict[str, Any]:
+        """What a Level says of the mesh that is solved next to be judged."""
+        zones, (elements, splits) = solved.zones, self.jobs[0]
+        return {
+            "elements": elements,
+            "splits": splits,
+            "rounds": max(1, len(zones) - 1),
+            "zone": zones[-2] if zones else None,
+        }
+
+    def advance(self, judged: Judged, reading: Reading, unresolved: bool) -> float:
+        """Choose the next mesh; returns how many unknowns it will have."""
+        if not self.jobs:
+            n, s = self.finest, self.splits + 1
+            fine = abs(judged.grading) > max(abs(judged.mesh), reading.uncertainty)
+            many = len(self.meshes) > 2 and self.halved
+            if many and (not self.changes or (fine and not unresolved)) and 2**s * self.first <= n:
+                jobs = [(n, i) for i in range(1, s + 1)]
+                self.jobs = [job for job in jobs if job not in self.values]
+            if not self.jobs:
+                self.jobs = [(2 * n, 0)]
+        return self._unknowns(*self.jobs[0])
+
+    def _unknowns(self, elements: int, splits: int) -> float:
+        """How many unknowns a mesh will have, by the growth of those before it."""
+        known = self.unknowns
+        if splits and (elements // 2**splits, 0) in known:
+            return float(known[elements // 2**splits, 0] * 4**splits)
+        own = [known[n, 0] for n in sorted(n for n, s in known if s == 0)]
+        growth = own[-1] / own[-2] if len(own) > 1 else 2.0 ** self.states[-1].dim
+        return float(own[-1] * growth)

@@ -1,0 +1,149 @@
+"""Meshes that are given, or made once, and then divided: where the quantity needs it, or everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from contactopt.accuracy.estimate import Judged, Level
+from contactopt.accuracy.everywhere import best_order, mesh_error, stuck
+from contactopt.accuracy.indicators import ElementErrors, element_errors
+from contactopt.accuracy.marking import (
+    at_contacts,
+    check_refinable,
+    divisible,
+    finer,
+    joined,
+    otherwise,
+    plateau,
+    unknowns,
+    with_bent_edges,
+)
+from contactopt.analysis.paths import solve_states
+from contactopt.analysis.quantities import Peak, Reading, nodal_pressure
+from contactopt.analysis.solve_scene import Options, Solved, solve_scene
+from contactopt.derivatives.outputs import Quantity
+from contactopt.scenes.scene import Scene
+
+SHARE = 0.6  # of the estimated error that the marked elements make; Doerfler's marking allows anything between 0 and 1
+USUAL = 2_000_000  # unknowns of the largest mesh, unless another bound is given
+
+
+class Locally:
+    """Divided meshes of a scene, or of the states of its load path.
+
+    whole    whether all elements are divided; the error is then read from differences of nested solutions, as in
+             contactopt.accuracy.everywhere, and otherwise element by element (contactopt.accuracy.indicators)
+    """
+
+    usual = USUAL
+
+    def __init__(self, states: tuple[Scene, ...], quantity: Quantity, options: Options, whole: bool):
+        check_refinable(states[-1])
+        made = [divisible(scene, not whole) for scene in states]
+        self.states, self.shapes = [scene for scene, _ in made], made[-1][1]
+        self.quantity, self.options, self.whole = quantity, options, whole
+        self.best = best_order(quantity.name, states[-1].degree)
+        self.values: list[float] = []
+        self.errors: ElementErrors | None = None
+        self.last: Solved | None = None
+        self.splits = 0
+
+    def solve(self) -> Solved:
+        """Solve the next mesh."""
+        return self._solved([with_bent_edges(scene, self.shapes) for scene in self.states])
+
+    def _solved(self, states: list[Scene]) -> Solved:
+        if len(states) > 1:
+            return solve_states(states, None, self.options)
+        return solve_scene(states[0], options=self.options, start=self.last)
+
+    def judge(self, solved: Solved, reading: Reading, levels: Sequence[Level]) -> Judged:
+        """What is known of the error of the value on the mesh that was solved last."""
+        self.last = solved
+        self.values.append(reading.value)
+        if self.whole:
+            mesh, order = mesh_error(self.values, self.best)
+            return Judged(abs(mesh), mesh, order=order)
+        self.errors = element_errors(solved, self.quantity, reading.value)
+        change = abs(reading.value - self.values[-2]) if len(self.values) > 1 else 0.0
+        size = self.errors.size
+        if self.errors.unsigned:  # no adjoint: what the last refinement changed, twice
+            size = 2 * change if len(self.values) > 1 else np.inf
+        return Judged(max(size, change), -self.errors.total, energy=self.errors.energy)
+
+    def vain(self) -> str:
+        """One sentence that says why further refinement would be in vain, or an empty text."""
+        if self.whole and stuck(self.values):
+            return (
+                f"the {self.quantity.name} does not converge: every refinement changes it by as much as the one before"
+            )
+        return ""
+
+    @property
+    def ready(self) -> bool:
+        """Whether enough is known for the target to count as reached."""
+        return len(self.values) > (2 if self.whole else 1)
+
+    def facts(self, solved: Solved) -> dict[str, Any]:
+        """What a Level says of the mesh beside its size."""
+        return {"elements": self.states[-1].elements, "splits": len(self.values)} if self.whole else {}
+
+    def advance(self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]) -> float:
+        """Divide elements; returns how many unknowns the next mesh has.
+
+        Parameters
+        ----------
+        judged, reading
+            Of the last mesh.
+        contacts
+            Numbers of contacts around which the mesh is too coarse to know.
+        rivals
+            Local maxima that may be the largest.
+        """
+        marked = None
+        if not self.whole:
+            assert self.last is not None and self.errors is not None
+            reduction = self.last.reduction
+            chosen = list(rivals)
+            if reading.uncertainty > 0.5 * judged.size:
+                chosen += reading.peaks[:1]
+            near = [contacts, *(peak.contacts for peak in chosen)]
+            if rivals:
+                pressure = nodal_pressure(reduction.problem, self.last.solution)
+                near.append(plateau(reduction, pressure, rivals))
+            marks = [self.errors.marked(SHARE), at_contacts(reduction, np.concatenate(near).astype(int))]
+            for peak in chosen:
+                if peak.body >= 0:
+                    none = np.empty(0, dtype=int)
+                    bodies = range(len(reduction.bodies))
+                    marks.append(tuple(peak.elements if i == peak.body else none for i in bodies))
+            marked = joined(*marks)
+        self.states = [finer(scene, marked, self.shapes) for scene in self.states]
+        return float(unknowns(self.states[-1]))
+
+    def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:
+        """By how much the quantity changes in the other shape of guessed boundaries, and one sentence on them.
+
+        Parameters
+        ----------
+        value
+            On the last mesh.
+        before
+            The states on that mesh.
+        """
+        if not self.shapes.names:
+            return 0.0, ""
+        sentence = (
+            f"the mesh gives boundary {self.shapes.names} by straight edges only, which are taken for chords of a smooth "
+            "line: give its `curve`, or a mesh of second order"
+        )
+        if not self.shapes.doubtful:
+            return 0.0, sentence
+        solved = self._solved([otherwise(scene, self.shapes) for scene in before])
+        if not solved.solution.solved:
+            return np.inf, sentence
+        other = self.quantity.read(solved.reduction, solved.solution).value
+        return abs(other - value), sentence

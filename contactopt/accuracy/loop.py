@@ -1,0 +1,278 @@
+"""Solve, estimate, refine: the one loop that bounds the error of a quantity."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from contactopt.accuracy.corners import unbounded
+from contactopt.accuracy.estimate import Estimate, Judged, Level
+from contactopt.accuracy.everywhere import Everywhere
+from contactopt.accuracy.locally import Locally
+from contactopt.accuracy.marking import overlooked
+from contactopt.analysis.limits import Limits
+from contactopt.analysis.progress import resident_memory
+from contactopt.analysis.quantities import Peak, Reading
+from contactopt.analysis.resolution import coarse
+from contactopt.analysis.solve_scene import Options, Solved
+from contactopt.checks import check_number
+from contactopt.derivatives.outputs import Quantity, find_quantity
+from contactopt.errors import InputError
+from contactopt.scenes.scene import Scene
+
+log = logging.getLogger(__name__)
+MOST_LEVELS = 60
+WATCHED = 1.5  # by how much larger the elements at a peak must have been for its change to tell its error
+UNWATCHED = 0.5  # of its value that a peak may be larger where no smaller elements have shown it
+ROUNDING = 1e-15  # least relative error: no reading is exact
+
+
+def refine(
+    states: Sequence[Scene],
+    quantity: str,
+    accuracy: float,
+    options: Options | None = None,
+    limits: Limits | None = None,
+    adaptive: bool = False,
+) -> tuple[Solved, Estimate]:
+    """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
+
+    Meshes are refined everywhere, or with `adaptive` where the quantity needs it, each body by itself; a mortar coupling
+    joins what no longer matches, and quadrilaterals and hexahedra become triangles and tetrahedra. Each solve
+    begins with the last answer. The search ends short of the target, with a sentence in the estimate, where the quantity
+    does not converge or does not exist, where the next mesh would pass a limit, and where a solve or a refinement fails.
+
+    Parameters
+    ----------
+    states
+        The scene, or the states of its load path.
+    quantity
+        A name of contactopt.derivatives.outputs, such as 'pressure', 'pressure:block-floor' or
+        'von_mises:block:fillet'.
+    accuracy
+        Bound on the estimated relative error of the quantity, between 0 and 1.
+    options
+        How each mesh is solved.
+    limits
+        On unknowns, time and memory.
+    adaptive
+        Whether meshes are refined only where the quantity needs it.
+
+    Returns
+    -------
+    tuple
+        The scene solved on the last mesh, which is the best answer where a bound ended the search, and the Estimate.
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity, body, boundary, pair or place and an accuracy out of range, before anything is
+        solved; and where the first mesh has no solution.
+    """
+    check_number("the accuracy", accuracy, low=0.0, high=1.0)
+    scene = states[-1]
+    asked = find_quantity(quantity, scene)
+    if asked.nodal:
+        raise InputError(
+            f"{quantity!r} is the value at a node of one mesh; ask for the pressure at a place, as in 'pressure@X,Y'."
+        )
+    if adaptive and len(states) > 1:
+        raise InputError(f"scene '{scene.name}' has a load path, which adaptive refinement does not follow.")
+    options = options or Options()
+    search = (
+        Locally(tuple(states), asked, options, not adaptive)
+        if adaptive or scene.given
+        else Everywhere(tuple(states), quantity, options)
+    )
+    return _Loop(asked, accuracy, options, limits or Limits(), search).run()
+
+
+@dataclass(eq=False)
+class _Loop:
+    """The state of one search.
+
+    solved, reading, judged   of the best answer so far;   states  its scenes, where these are divided
+    levels, peaks             of every mesh
+    """
+
+    quantity: Quantity
+    accuracy: float
+    options: Options
+    limits: Limits
+    search: Everywhere | Locally
+    levels: list[Level] = field(default_factory=list)
+    peaks: list[tuple[Peak, ...]] = field(default_factory=list)
+    solved: Solved | None = None
+    reading: Reading = field(default_factory=lambda: Reading(0.0))
+    judged: Judged = field(default_factory=lambda: Judged(np.inf))
+    states: list[Scene] = field(default_factory=list)
+
+    def run(self) -> tuple[Solved, Estimate]:
+        """Solve mesh after mesh until there is a reason to stop."""
+        self.began, self.before = time.perf_counter(), resident_memory()
+        message = ""
+        while not message:
+            start = time.perf_counter()
+            try:
+                message = self._next()
+                if not message:
+                    message = self._limit(self._advance(), time.perf_counter() - start)
+            except InputError as error:
+                if not self.levels:
+                    raise
+                message = f"the search ended early: {error}"
+        return self._end(message)
+
+    def _next(self) -> str:
+        """Solve and judge one mesh; one sentence if the search ends there."""
+        states = list(self.search.states)
+        solved = self.search.solve()
+        if not solved.solution.solved:
+            sentence = f"the mesh of {solved.reduction.dofs} unknowns was not solved: {solved.solution.message}"
+            if not self.levels:
+                raise InputError(f"scene '{states[-1].name}': {sentence}; begin with another mesh or load.")
+            return sentence
+        reading = self.quantity.read(solved.reduction, solved.solution)
+        facts = self.search.facts(solved)
+        judged = self.search.judge(solved, reading, self.levels)
+        self.solved, self.reading, self.judged, self.states = solved, reading, judged, states
+        self.peaks.append(reading.peaks)
+        self.rivals, excess = self._rivals()
+        self.unresolved = self._unresolved()
+        size = max(judged.size, reading.uncertainty, excess)
+        scale = abs(reading.value) or 1.0
+        error = max(size / scale, solved.solution.residual, ROUNDING)
+        top = reading.peaks[0] if reading.peaks and reading.peaks[0].size else None
+        self.levels.append(
+            Level(
+                solved.reduction.dofs,
+                solved.reduction.problem.contacts,
+                reading.value,
+                reading.uncertainty,
+                error if np.isfinite(error) else None,
+                time.perf_counter() - self.began,
+                judged.energy,
+                tuple(top.place.tolist()) if top else (),
+                top.size if top else 0.0,
+                **facts,
+            )
+        )
+        self.options.note(f"{self.quantity.name} {reading.value:.6g}, estimated error {error:.1e}")
+        return self._stop()
+
+    def _stop(self) -> str:
+        """One sentence that says that the target is reached or out of reach, or an empty text."""
+        vain = unbounded(self.solved, self.reading, self.levels) if self.solved else ""
+        if not vain and not len(self.unresolved):
+            vain = self.search.vain()
+        if self.reading.missing and len(self.levels) > 2:
+            vain = self.reading.missing
+        error = self.levels[-1].error
+        self.vain = bool(vain)
+        self.reached = (
+            not vain
+            and not self.reading.missing
+            and self.search.ready
+            and not len(self.unresolved)
+            and error is not None
+            and error <= self.accuracy
+        )
+        if vain or self.reached:
+            return vain or f"the estimated error of the {self.quantity.name} is below the target"
+        if len(self.levels) >= MOST_LEVELS:
+            return f"{MOST_LEVELS} meshes did not reach the target"
+        return ""
+
+    def _rivals(self) -> tuple[list[Peak], float]:
+        """The local maxima that may be the largest, and by how much they may exceed the value."""
+        last = self.peaks[-1]
+        if len(last) < 2:
+            return [], 0.0
+        found, excess = [], 0.0
+        for peak in last[1:]:
+            doubt = self._change(peak)
+            if peak.value + doubt >= last[0].value - last[0].uncertainty:
+                found.append(peak)
+                excess = max(excess, peak.value + doubt - last[0].value)
+        return found, excess
+
+    def _change(self, peak: Peak) -> float:
+        """By how much the nearest peak on the last mesh whose elements were larger there differed, or half the value.
+
+        What nodes scatter about a fit is no measure here: where facets change their length, it is large on every mesh.
+        """
+        for earlier in reversed(self.peaks[:-1]):
+            larger = [one for one in earlier if one.size >= WATCHED * peak.size]
+            if larger:
+                nearest = min(larger, key=lambda one: float(np.linalg.norm(one.place - peak.place)))
+                return abs(nearest.value - peak.value)
+        return UNWATCHED * peak.value
+
+    def _unresolved(self) -> np.ndarray:
+        """Numbers of contacts around which the mesh is too coarse to know anything."""
+        assert self.solved is not None
+        reduction, solution = self.solved.reduction, self.solved.solution
+        problem = reduction.problem
+        touching = problem.law.pressed(solution.reactions)
+        apart = problem.displacements(solution.reactions, solution.multipliers)[:, 0]
+        few = [own for _, own in coarse(reduction, solution)]
+        return np.concatenate([overlooked(reduction, touching, apart), *few]).astype(int)
+
+    def _advance(self) -> float:
+        """Choose the next mesh; returns how many unknowns it has."""
+        if isinstance(self.search, Locally):
+            return self.search.advance(self.judged, self.reading, self.unresolved, self.rivals)
+        return self.search.advance(self.judged, self.reading, bool(len(self.unresolved)))
+
+    def _limit(self, unknowns: float, last: float) -> str:
+        """One sentence if the next mesh passes a limit."""
+        growth = unknowns / self.levels[-1].unknowns
+        held = (resident_memory() - self.before) * (1 + growth)
+        spent = time.perf_counter() - self.began
+        return self.limits.refusal(unknowns, self.search.usual, spent + last, held)
+
+    def _geometry(self) -> tuple[float, str]:
+        """The error that the shape of guessed boundaries makes [unit of the quantity], and a sentence on it."""
+        if not isinstance(self.search, Locally) or self.vain or self.reading.missing:
+            return 0.0, ""
+        try:
+            return self.search.geometry(self.reading.value, self.states)
+        except InputError as error:
+            log.info("the other shape of guessed boundaries was not solved: %s", error)
+            return 0.0, ""
+
+    def _end(self, message: str) -> tuple[Solved, Estimate]:
+        """The best answer with all that is known of it."""
+        assert self.solved is not None
+        value, judged = self.reading.value, self.judged
+        last, scale = self.levels[-1], abs(self.reading.value) or 1.0
+        geometry, sentence = self._geometry()
+        known = last.error is not None and not self.vain and np.isfinite(geometry)
+        error = last.error + geometry / scale if known and last.error is not None else None
+        reached = self.reached and error is not None and error <= self.accuracy
+        if sentence:
+            start = message if reached or not self.reached else "the geometry keeps the target out of reach"
+            part = f"{geometry / scale:.1e} of the error is that of the geometry, since " if geometry > 0 else ""
+            message = f"{start}; {part}{sentence}"
+        seconds = dict(self.solved.solution.seconds)
+        seconds["coarse"] = seconds.get("coarse", 0.0) + max(last.seconds - sum(seconds.values()), 0.0)
+        solution = replace(self.solved.solution, seconds=seconds)
+        signed = known and np.isfinite(judged.mesh)
+        return replace(self.solved, solution=solution), Estimate(
+            self.quantity.name,
+            self.accuracy,
+            value,
+            value - judged.mesh - judged.grading if signed else None,
+            error,
+            judged.mesh / scale if signed else None,
+            judged.grading / scale if signed else None,
+            geometry / scale if np.isfinite(geometry) else 1.0,
+            judged.order,
+            reached,
+            message,
+            tuple(self.levels),
+        )

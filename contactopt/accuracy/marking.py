@@ -1,0 +1,303 @@
+"""Which elements are divided, and the meshes that come of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from contactopt.accuracy.polygon import Chords, chords_of, flatter
+from contactopt.analysis.quantities import Peak
+from contactopt.bodies.elements import is_curved, straight
+from contactopt.bodies.local_refinement import Curve, bent, divide, facets_of, simplices, split
+from contactopt.bodies.refinement import part_curves
+from contactopt.errors import InputError
+from contactopt.interface.reduction import Reduction
+from contactopt.scenes.scene import Part, Rigid, Scene
+
+FIRST = 4  # elements across the contact half-width of a first mesh that the scene itself makes
+RATIO = 1.6  # by how much longer facets may be than those of the other body that face them
+ROUNDS = 6  # of divisions that keep facing facets about as long as each other
+SAMPLES = {2: 32, 3: 8}  # parts of a facet's edge at whose ends a gap function is sampled
+CLOSURE = 0.05  # share of the closure by which a sampled gap may fall below the one between nodes
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """What the meshes of a scene stand for.
+
+    curves   name of the body -> name of the boundary -> curve
+    guessed  name of the body -> name of the boundary -> its edges, where the curve is a guess
+    """
+
+    curves: Mapping[str, Mapping[str, Curve]]
+    guessed: Mapping[str, Mapping[str, Chords]]
+
+    @property
+    def names(self) -> str:
+        """The guessed boundaries in words."""
+        found = [f"'{name}' of body '{body}'" for body, own in self.guessed.items() for name in own if name]
+        return ", ".join(found[:3]) + (" and more" if len(found) > 3 else "")
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether a guess may be wrong."""
+        chords = [own for found in self.guessed.values() for own in found.values()]
+        return any(bool(np.any(doubt > 0)) for _, _, doubt in chords)
+
+    def of(self, part: Any) -> Mapping[str, Curve]:
+        return self.curves.get(part.name, {})
+
+
+def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
+    """Put a scene on meshes of straight elements, and find the curves of their boundaries.
+
+    A boundary follows the `curve` of its part or the edges of second order of its file. Without them the curve is a
+    guess, the smooth outline through the nodes of the first mesh (contactopt.bodies.curves).
+
+    Parameters
+    ----------
+    scene
+        The scene, whose mesh functions make coarse first meshes.
+    simplicial
+        Whether quadrilaterals and hexahedra are cut into triangles and tetrahedra.
+
+    Returns
+    -------
+    tuple
+        The scene with its meshes, and their Shapes.
+    """
+    curves: dict[str, dict[str, Curve]] = {}
+    guessed: dict[str, dict[str, Chords]] = {}
+
+    def prepared(part: Any) -> Any:
+        if not isinstance(part, Part):
+            return part
+        given = part.build_mesh(FIRST, scene.zone)
+        corners = straight(given) if is_curved(given) else given
+        cut = simplices(corners) if simplicial else corners
+        found = curves[part.name] = part_curves(part, given)
+        unsure = [name for name, curve in found.items() if not getattr(curve, "known", False)]
+        guessed[part.name] = {name: chords_of(cut, facets_of(cut, name)) for name in unsure if scene.dim == 2}
+        own = {name: found[name] for name in scene.surfaces_of(part) if name in found}
+        return replace(part, mesh=cut, curve=own or None)
+
+    return scene.with_parts(prepared), Shapes(curves, guessed)
+
+
+def with_bent_edges(scene: Scene, shapes: Shapes) -> Scene:
+    """The scene as it is solved: with quadratic displacements the edges follow the curved boundaries."""
+    if scene.degree == 1:
+        return scene
+    return _with_meshes(scene, lambda part: bent(part.mesh, shapes.of(part)))
+
+
+def otherwise(scene: Scene, shapes: Shapes) -> Scene:
+    """The scene with every guessed boundary in its other shape (contactopt.accuracy.polygon), as it is solved."""
+
+    def moved(part: Part) -> Any:
+        points, curves = part.mesh.p.copy(), dict[str, Any](shapes.of(part))
+        for name, chords in shapes.guessed.get(part.name, {}).items():
+            nodes = np.unique(part.mesh.facets[:, facets_of(part.mesh, name)])
+            points[:, nodes] = flatter(points[:, nodes], chords)
+            curves[name] = partial(_flattened, curves[name], chords)
+        mesh = replace(part.mesh, doflocs=points)
+        return mesh if scene.degree == 1 else bent(mesh, curves)
+
+    return _with_meshes(scene, moved)
+
+
+def _flattened(curve: Curve, chords: Chords, points: np.ndarray) -> np.ndarray:
+    return flatter(curve(points), chords)
+
+
+def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -> Scene:
+    """The scene with the marked elements of every body divided; with all of them where nothing is said.
+
+    Facets that face much finer ones of another body are divided with them (`balanced`), until none is left.
+    """
+    if marked is None:
+        return _with_meshes(scene, lambda part: split(part.mesh, shapes.of(part)))
+    for _ in range(ROUNDS):
+        marked = balanced(scene, marked)
+        if not any(len(elements) for elements in marked):
+            break
+        scene = _divided(scene, marked, shapes)
+        marked = tuple(np.empty(0, dtype=int) for _ in scene.parts)
+    return scene
+
+
+def _divided(scene: Scene, marked: tuple[np.ndarray, ...], shapes: Shapes) -> Scene:
+    numbers = iter(marked)
+
+    def divided(part: Any) -> Any:
+        elements = next(numbers)
+        if not isinstance(part, Part) or not len(elements):
+            return part
+        return replace(part, mesh=divide(part.mesh, elements, shapes.of(part)))
+
+    return scene.with_parts(divided)
+
+
+def _with_meshes(scene: Scene, mesh: Callable[[Part], Any]) -> Scene:
+    return scene.with_parts(lambda part: replace(part, mesh=mesh(part)) if isinstance(part, Part) else part)
+
+
+def unknowns(scene: Scene) -> int:
+    """The displacement components of all nodes of the meshes, at least as many as a mesh has unknowns."""
+    total = 0
+    for part in scene.parts:
+        if isinstance(part, Part):
+            mesh = part.mesh
+            inner = (mesh.nfacets if scene.dim == 2 else mesh.nedges) if scene.degree == 2 else 0
+            total += scene.dim * int(mesh.nvertices + inner)
+    return total
+
+
+def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+    """Mark more elements, so that surfaces that face each other stay about as fine as each other.
+
+    A surface that is much finer than the one that it touches sees the facets of the other one as a polygon, whose corners
+    press with a pressure that grows with every refinement of the fine side.
+
+    Parameters
+    ----------
+    scene
+        The scene on meshes of simplices.
+    marked
+        For each body the elements that will be divided.
+
+    Returns
+    -------
+    tuple
+        For each body the elements, those of `marked` among them.
+    """
+    chosen = [set(elements.tolist()) for elements in marked]
+    names = [part.name for part in scene.parts]
+    for pair in scene.pairs:
+        sides = [names.index(body) for body in pair.bodies]
+        parts = [part for part in (scene.parts[i] for i in sides) if isinstance(part, Part)]
+        if len(parts) < 2:
+            continue
+        faces = [_facets(part, surface or part.contact) for part, surface in zip(parts, pair.surfaces)]
+        for one, other in ((0, 1), (1, 0)):
+            middle, size, element = faces[one]
+            facing, small, theirs = faces[other]
+            halved = np.where(np.isin(theirs, list(chosen[sides[other]])), 0.5, 1.0) * small
+            distance, near = cKDTree(facing.T).query(middle.T)
+            back, mine = cKDTree(middle.T).query(facing.T)
+            least = halved[near].copy()
+            reached = back <= 2 * size[mine]
+            np.minimum.at(least, mine[reached], halved[reached])
+            coarse = (size > RATIO * least) & (distance <= 2 * size)
+            chosen[sides[one]].update(element[coarse].tolist())
+    return tuple(np.array(sorted(elements), dtype=int) for elements in chosen)
+
+
+def _facets(part: Part, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Middles (dim, f) and sizes (f,) of the facets of a boundary [length], and their elements."""
+    mesh = straight(part.mesh)
+    facets = mesh.boundaries[name]
+    corners = mesh.p[:, mesh.facets[:, facets]]
+    size = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=0).max(axis=0)
+    return corners.mean(axis=1), size, mesh.f2t[0, facets]
+
+
+def at_contacts(reduction: Reduction, contacts: np.ndarray) -> tuple[np.ndarray, ...]:
+    """For each body the elements at the nodes of some contacts."""
+    weights = np.zeros(reduction.problem.q.shape)
+    weights[contacts] = 1.0
+    made = (np.asarray(abs(B).T @ weights.ravel()) for B in reduction.maps)
+    return tuple(np.flatnonzero(body.on_elements(force)) for body, force in zip(reduction.bodies, made))
+
+
+def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -> np.ndarray:
+    """Numbers of the contacts that press at least as much as the least of some peaks on their own pair of surfaces.
+
+    Where many peaks come close to the largest one, the pressure is nearly even: its surface is then divided as one, since
+    facets of different lengths would make peaks of their own.
+    """
+    found = [np.empty(0, dtype=int)]
+    for pair in reduction.problem.pairs:
+        own = [one.value for one in peaks if len(one.contacts) and pair.start <= one.contacts[0] < pair.stop]
+        if own:
+            found.append(np.flatnonzero(pressure[pair.contacts] >= min(own)) + pair.start)
+    return np.concatenate(found)
+
+
+def joined(*marks: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
+    """For each body all elements of several marks."""
+    return tuple(np.unique(np.concatenate(own)).astype(int) for own in zip(*marks))
+
+
+def overlooked(reduction: Reduction, touching: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Find the contacts between which the gap of a rigid body is smaller than at the contacts.
+
+    Gap functions are sampled within every facet. Counted is where the sample undercuts what the facet has between its nodes
+    by more than the surfaces are apart there and CLOSURE of the closure.
+
+    Parameters
+    ----------
+    reduction
+        The reduced scene.
+    touching
+        (k,) mask of the contacts that touch.
+    apart
+        (k,) distance of the surfaces in the solution [length].
+
+    Returns
+    -------
+    ndarray
+        Numbers of the contacts at the corners of such facets.
+    """
+    scene, problem = reduction.scene, reduction.problem
+    found = [np.empty(0, dtype=int)]
+    parts = {part.name: part for part in scene.parts}
+    for pair, made, coupling in zip(scene.pairs, problem.pairs, reduction.couplings):
+        rigid = [part for part in (parts[body] for body in pair.bodies) if isinstance(part, Rigid)]
+        cells = coupling.cells.T
+        gap = rigid[0].gap if rigid else None
+        if not callable(gap) or not np.size(cells):
+            continue
+        corners = cells[:, : scene.dim]  # of a quadrilateral half
+        shares = _lattice(scene.dim)
+        own, clear = coupling.gap, np.maximum(apart[made.contacts], 0.0)
+        points = np.einsum("sc,dvc->dvs", shares, problem.coordinates[:, made.contacts][:, corners])
+        sampled = np.asarray(gap(points.reshape(scene.dim, -1)), dtype=float).reshape(points.shape[1:])
+        between = own[corners] @ shares.T
+        closure = float(np.ptp(own[touching[made.contacts]])) if touching[made.contacts].any() else 0.0
+        bound = clear[corners] @ shares.T + CLOSURE * closure
+        rounding = 1e-9 * float(np.abs(problem.coordinates).max())
+        hidden = np.any(between - sampled > bound + rounding, axis=1)
+        found.append(np.unique(corners[hidden]) + made.start)
+    return np.concatenate(found)
+
+
+def _lattice(dim: int) -> np.ndarray:
+    """Shares (s, dim) of the corners at evenly spaced places within a facet."""
+    n = SAMPLES[dim]
+    ticks = np.arange(1, n) / n
+    if dim == 2:
+        return np.stack([1 - ticks, ticks], axis=1)
+    first, second = (part.ravel() for part in np.meshgrid(ticks, ticks))
+    inside = first + second < 1
+    return np.stack([1 - first - second, first, second], axis=1)[inside]
+
+
+def check_refinable(scene: Scene) -> None:
+    """InputError, before anything is solved, for a scene that has no mesh to refine, or one that lives on another rank."""
+    meshed = [part for part in scene.parts if isinstance(part, Part)]
+    if not meshed:
+        raise InputError(
+            f"scene '{scene.name}' has no mesh to refine: give the points of its half-spaces as a function "
+            "(elements, zone) -> points."
+        )
+    away = [part.name for part in meshed if getattr(part, "team", None) is not None]
+    if away:
+        raise InputError(
+            f"the mesh of body '{away[0]}' lives on another rank, where it is not refined locally; run on one rank."
+        )
