@@ -156,8 +156,12 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     prescribed, held, motion, plate_forces, driven, holders = _constraints(scene, part, basis)
     rigid_motions = free_motions(scene.kind, scene.components, basis, node_unknowns(basis), held, weight)
     check_free(part.name, A, rigid_motions)
-    surfaces = scene.surfaces_of(part)
-    contacts = {name: contact_trace(basis, scene.degree, mesh.boundaries[name], weight) for name in surfaces}
+    contacts = {
+        name: contact_trace(
+            basis, scene.degree, mesh.boundaries[name], weight, scene.laws_of(part, name) == {"tied"}
+        )
+        for name in scene.surfaces_of(part)
+    }
     return Assembly(
         part.name,
         scene.kind,

@@ -364,13 +364,33 @@ class Scene:
         tuple
             The names, each once, in the order of the pairs.
         """
-        found = [
-            surface or part.contact
+        return tuple(dict.fromkeys(name for name, _ in self._uses(part))) or (part.contact,)
+
+    def laws_of(self, part: Any, boundary: str) -> set[str]:
+        """Name the contact laws of the pairs that use a boundary.
+
+        Parameters
+        ----------
+        part
+            One of the bodies.
+        boundary
+            The name of one of its boundaries.
+
+        Returns
+        -------
+        set
+            Their names; none for a boundary that no pair uses.
+        """
+        return {pair.law for name, pair in self._uses(part) if name == boundary}
+
+    def _uses(self, part: Any) -> list[tuple[str, Contact]]:
+        """The boundaries of a part that pairs use, each with its pair."""
+        return [
+            (surface or part.contact, pair)
             for pair in self.pairs
             for body, surface in zip(pair.bodies, pair.surfaces)
             if body == part.name
         ]
-        return tuple(dict.fromkeys(found)) or (part.contact,)
 
     @property
     def components(self) -> tuple[str, ...]:
