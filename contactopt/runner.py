@@ -19,6 +19,7 @@ from contactopt.analysis.quantities import approach, peak_pressure, stick_width,
 from contactopt.analysis.resolution import remarks
 from contactopt.analysis.resultants import mirrors, tables
 from contactopt.analysis.solve_scene import Options, Solved
+from contactopt.analysis.validity import validity
 from contactopt.bodies.ranks import Team, spread
 from contactopt.cards import card, count, line
 from contactopt.errors import InputError
@@ -74,7 +75,7 @@ class Result:
             "status": f"{s['status']}: {self.solution.message}",
             "residual (certificate)": f"{s['residual']:.2e}",
             "unknowns, contacts": f"{s['dofs']}, {s['contact_nodes']}",
-            "normal force": f"{s['normal_force']:.6g} {stress} {length}^2",
+            "sum of normal forces": f"{s['normal_force']:.6g} {stress} {length}^2",
             "largest pressure": f"{s['max_pressure']:.6g} {stress}",
         }
         for key in ("approach", "contact_half_width", "stick_half_width"):
@@ -406,6 +407,7 @@ def _summary(
     problem, r = reduction.problem, solution.reactions
     found = tables(reduction, solution)
     single = len(problem.pairs) == 1
+    limits, beyond = validity(reduction, solution)
     summary: dict[str, Any] = {
         "scene": reduction.scene.name,
         "kind": reduction.scene.kind,
@@ -429,8 +431,9 @@ def _summary(
         "pressure": peak_pressure(reduction, solution) if single else None,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
-        "remarks": list(remarks(reduction, solution)),
+        "remarks": [*remarks(reduction, solution), *beyond],
         **found,
+        "limits": limits,
     }
     if path is not None:
         keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]

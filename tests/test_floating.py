@@ -243,4 +243,4 @@ def test_a_rigid_normal_on_the_wrong_side_is_refused():
     part = Part("b", block([0.0, 0.0], [1.0, 1.0], [2, 2]), SOFT, loads=(BodyForce((0.0, 2.0)),), contact="bottom")
     for floor in (Rigid("floor", normal=(0, -1)), Rigid("floor", normal=(0, -2), gap=lambda x: x[1] + x[0] ** 2)):
         with pytest.raises(InputError, match="points away from body 'b'"):
-            reduce(alone(part, floor))
+            reduce_bodies(alone(part, floor))

@@ -36,6 +36,7 @@ KEYS = [
     "remarks",
     "pairs",
     "holders",
+    "limits",
     "seconds",
 ]
 SMALL = {"punch-2d": 6, "punch-3d": 3, "sphere": 8}

@@ -25,10 +25,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.body import Assembly, build_body, reload_body
+from contactopt.bodies.body import Assembly, build_body, guides_of, reload_body
 from contactopt.bodies.elements import face_nodes
-from contactopt.bodies.fields import Fields, fields_of, recovery_errors
-from contactopt.bodies.protocol import Equilibrium, Mesh, Region, Surface
+from contactopt.bodies.fields import Fields, Limits, fields_of, limits_of, recovery_errors
+from contactopt.bodies.protocol import Equilibrium, Guides, Mesh, Region, Surface
 from contactopt.bodies.recovery import StressMap, stress_map
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
@@ -157,8 +157,15 @@ class ElasticBody:
             U = self.at_rest + self.motions @ multipliers + left @ (right.T @ force)
             U[self.equilibrium.free] += free
             return np.asarray(U)
-        U = self.at_rest + self.elastic_modes @ (self.elastic_modes.T @ force) + self.motions @ multipliers
-        return np.asarray(U + self.relieved(force))
+        # One solve for loads and contact forces together: in a thin body each alone moves it far.
+        return np.asarray(self._under(force) + self.motions @ multipliers)
+
+    def _under(self, force: np.ndarray) -> np.ndarray:
+        """Displacement (n,) under the loads, supports, plates and nodal forces (n,), with multipliers of zero."""
+        body = self.body
+        missing = body.load + force - body.A @ body.prescribed
+        resisted = body.plate_forces + self.extended.T @ missing
+        return np.asarray(body.prescribed + self.elastic_modes @ (self.modes[1].T @ resisted) + self.relieved(missing))
 
     def relieved(self, force: np.ndarray) -> np.ndarray:
         """Displacements (n,) or (n, j) under nodal forces on the free unknowns, with plates at rest."""
@@ -208,6 +215,12 @@ class ElasticBody:
 
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
+
+    def seen(self, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
+        return np.asarray(T @ U)
+
+    def limits(self, U: np.ndarray, force: np.ndarray) -> Limits:
+        return limits_of(self.body, U, force)
 
     def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
         return recovery_errors(self.body, U, *others)
@@ -284,6 +297,9 @@ class AssembledElastic:
             trace.cells,
             Mesh(kind, body.degree, faces, outward, body.weight, body.locations, unknowns, held, curve),
         )
+
+    def guides(self) -> Guides:
+        return guides_of(self.body, self.part)
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
         raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
@@ -414,10 +430,7 @@ def _rigid_extension(body: Assembly) -> np.ndarray:
 def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:
     """The body `old` under the loads of `body`."""
     # With the prescribed displacements put in, loads act on the free unknowns and on the plates: p + Z' (f - A g).
-    residual = body.load - body.A @ body.prescribed
-    resisted = body.plate_forces + old.extended.T @ residual
-    # The displacement without contact forces: that of supports, of the resisted plate motions, and of the free
-    # unknowns.
-    at_rest = body.prescribed + old.elastic_modes @ (old.modes[1].T @ resisted) + old.relieved(residual)
+    resisted = body.plate_forces + old.extended.T @ (body.load - body.A @ body.prescribed)
     resultants = np.concatenate([old.modes[0].T @ resisted, body.rigid_motions.fields.T @ body.load])
-    return replace(old, body=body, at_rest=at_rest, resultants=resultants)
+    new = replace(old, body=body, resultants=resultants)
+    return replace(new, at_rest=new._under(np.zeros(len(body.load))))

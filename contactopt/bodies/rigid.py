@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import Surface
+from contactopt.bodies.fields import Limits
+from contactopt.bodies.protocol import Guides, Surface
 from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.problem.operators import Product
@@ -95,7 +96,10 @@ class RigidBody:
         `facing` (k,) is the cosine between the normal and the one that the other body suggests.
         """
         nearest = gap <= gap.min(initial=np.inf) + NEAREST * float(np.max(np.abs(gap), initial=0.0))
-        if self.part.normal is not None and np.sum((facing * other.areas)[nearest]) < -FLAT * other.areas[nearest].sum():
+        if (
+            self.part.normal is not None
+            and np.sum((facing * other.areas)[nearest]) < -FLAT * other.areas[nearest].sum()
+        ):
             raise InputError(
                 f"rigid body '{self.name}': its normal points away from body '{other.body}' where they are "
                 "nearest; a contact normal points from the lower body to the upper one, so turn its sign."
@@ -119,6 +123,9 @@ class RigidBody:
         if gap.shape != other.places.shape[1:] or not np.all(np.isfinite(gap)):
             raise InputError(f"the gap of rigid body '{self.name}' must give one finite number per contact node.")
         return np.asarray(other.weights @ gap)
+
+    def guides(self) -> Guides:
+        return Guides(np.zeros((len(self.components), 0)))
 
     def iterates(self, solver: str) -> bool:
         return False
@@ -180,6 +187,12 @@ class RigidBody:
 
     def fields(self, U: np.ndarray) -> None:
         return None
+
+    def seen(self, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
+        return np.asarray(T @ U)
+
+    def limits(self, U: np.ndarray, force: np.ndarray) -> Limits:
+        return Limits()
 
     def loaded(self, scene: Scene, part: Rigid) -> RigidBody:
         """With other values of the total force, and other free components if need be."""

@@ -25,7 +25,7 @@ import numpy as np
 from contactopt.analysis.edges import contact_edge, stick_edge
 from contactopt.analysis.places import PLACED, Place, map_of, place_of, pressure_weights, read_stress
 from contactopt.analysis.quantities import QUANTITIES, elastic_energy
-from contactopt.analysis.resultants import planes_of, views
+from contactopt.analysis.resultants import views
 from contactopt.derivatives.parameters import MATERIAL, Parameter
 from contactopt.derivatives.states import Seeds, Step
 from contactopt.errors import InputError
@@ -136,7 +136,7 @@ def _resultant(step: Step, pair: str, component: str) -> Seeds:
     if component not in scene.components:
         raise InputError(f"there is no component {component!r}; use {', '.join(scene.components)}.")
     axis = np.eye(scene.dim)[scene.components.index(component)]
-    for plane in planes_of(step.reduction):  # mirror images balance each other across it
+    for plane in step.reduction.planes:  # mirror images balance each other across it
         axis = axis - plane.inward * (plane.inward @ axis)
     if scene.kind == "axisymmetric" and component == "r":
         axis = 0 * axis

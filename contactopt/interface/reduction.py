@@ -18,9 +18,10 @@ import logging
 import time
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import FunctionType
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.sparse as sp
@@ -32,9 +33,11 @@ from contactopt.bodies.solvers import factors_of
 from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
+from contactopt.interface.charts import SymmetryPlane
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
 from contactopt.interface.coupling import Coupling, couple
 from contactopt.interface.equilibrium import coupled_form
+from contactopt.interface.halves import mirror_planes
 from contactopt.problem import InterfaceProblem, Law, Pair, Solution
 from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import make_law
@@ -65,6 +68,7 @@ class Reduction:
     maps       the signed map B (k dim, n) of each body, from its displacements to u
     couplings  contacts, frames, initial gap, areas, chart of each pair of surfaces
     seconds    phase -> time
+    planes     of symmetry beyond which mirror images make the bodies whole
     """
 
     scene: Scene
@@ -73,6 +77,10 @@ class Reduction:
     maps: tuple[sp.csr_matrix, ...]
     couplings: tuple[Coupling, ...]
     seconds: dict[str, float]
+    planes: tuple[SymmetryPlane, ...] = ()
+    _known: WeakKeyDictionary[Solution, tuple[Any, ...]] = field(
+        default_factory=WeakKeyDictionary, init=False, repr=False
+    )
 
     def __repr__(self) -> str:
         unknowns, pairs = (
@@ -142,7 +150,7 @@ class Reduction:
     def displaced(self, solution: Solution) -> tuple[np.ndarray, ...]:
         """Compute the displacements of every body of a solution.
 
-        Bodies whose displacements came with the contact forces are not solved again.
+        They are computed once. Bodies whose displacements came with the contact forces are not solved at all.
 
         Parameters
         ----------
@@ -154,6 +162,8 @@ class Reduction:
         tuple
             U (n_b,) of each body [length].
         """
+        if solution in self._known:
+            return self._known[solution]
         known = [] if solution.displacements is None else list(solution.displacements.parts)
         free = [known.pop(0) if known and body.equilibrium is not None else None for body in self.bodies]
         parts = zip(self.bodies, self.maps, self.own_multipliers(solution.multipliers), free)
@@ -162,7 +172,8 @@ class Reduction:
             body, B, own, X = part
             return body.displacement(B.T @ solution.reactions.ravel(), own, X)
 
-        return each(displaced, parts, [body.parallel for body in self.bodies])
+        self._known[solution] = each(displaced, parts, [body.parallel for body in self.bodies])
+        return self._known[solution]
 
     def loaded(self, scene: Scene) -> Reduction:
         """Put the loads of another scene of the same structure on the same bodies, coupling and Q.
@@ -313,6 +324,7 @@ def reduce_bodies(
     sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
     coupled = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in zip(scene.pairs, sides))
     maps = tuple(_map_of(body, sides, coupled) for body in assembled)
+    planes = mirror_planes(scene, [body.guides() for body in assembled], coupled) if scene.copies > 1 else ()
     seconds["assemble"] = time.perf_counter() - start
 
     start = time.perf_counter()
@@ -336,7 +348,7 @@ def reduce_bodies(
     made = _operator(bodies, maps, coupled) if Q == "implicit" else _entries(bodies, maps)
     problem = _problem(scene, made, bodies, maps, coupled)
     seconds["compliance"] = time.perf_counter() - start
-    return Reduction(scene, problem, bodies, maps, coupled, seconds)
+    return Reduction(scene, problem, bodies, maps, coupled, seconds, planes)
 
 
 def _map_of(
