@@ -55,19 +55,21 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
         bound.
     """
     displaced, reactions = reduction.displaced(solution), solution.reactions.ravel()
-    bodies, remarks = {}, []
-    moved = reduction.gap[:, None] * np.eye(solution.reactions.shape[1])[0]
+    bodies: dict[str, dict[str, float]] = {}
+    remarks: list[str] = []
+    moved = reduction.seen(displaced)
     scale = np.zeros(len(moved))
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
-        own = bodies[body.name] = body.limits(U, B.T @ reactions)._asdict()
-        remarks += [_beyond(key, f"body '{body.name}'", own[key]) for key in ("strain", "rotation")]
-        if own["imbalance"] > BOUNDS["imbalance"]:
+        known = bodies[body.name] = body.limits(U, B.T @ reactions)._asdict()
+        remarks += [_beyond(key, f"body '{body.name}'", known[key]) for key in ("strain", "rotation")]
+        if known["imbalance"] > BOUNDS["imbalance"]:
             remarks.append(
-                f"body '{body.name}' is not in equilibrium: {own['imbalance']:.1e} of the forces on it are left over; it is "
+                f"body '{body.name}' is not in equilibrium: {known['imbalance']:.1e} of the forces on it are left over; it is "
                 "so thin or so weakly held that rounding moves it."
             )
-        part = body.seen(B, U).reshape(moved.shape)
-        moved, scale = moved + part, np.maximum(scale, np.linalg.norm(part, axis=1))
+        near = np.diff(B.indptr).reshape(moved.shape).any(axis=1)  # the contacts that the body takes part in
+        size = np.linalg.norm(body.seen(B, U).reshape(moved.shape), axis=1)
+        scale = np.maximum(scale, np.where(near, np.maximum(size, known["moved"]), 0.0))
     status, pairs = contact_status(reduction.problem, solution.reactions), {}
     for pair, made in zip(reduction.problem.pairs, reduction.couplings):
         own, touching = pair.contacts, status.touching[pair.contacts]

@@ -32,6 +32,7 @@ from contactopt.bodies.protocol import Equilibrium, Guides, Mesh, Region, Surfac
 from contactopt.bodies.recovery import StressMap, stress_map
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
+from contactopt.bodies.thin import is_thin, on_ground
 from contactopt.errors import InputError
 from contactopt.problem.operators import Product
 from contactopt.scenes.scene import Part, Scene
@@ -53,6 +54,7 @@ class ElasticBody:
     modes       (j, p) and (j, j - p) combinations of them that move freely, and those with elastic resistance, scaled so
                 that the elastic modes E = Z modes[1] add E E' to the compliance
     resultants  (p + i,) resultants s of the loads in the free motions, those of plates first
+    ground      (n, n) stiffness of a ground that holds the body meanwhile, and pull (n,) its forces (contactopt.bodies.thin)
     """
 
     body: Assembly
@@ -64,10 +66,17 @@ class ElasticBody:
     extended: np.ndarray
     modes: tuple[np.ndarray, np.ndarray]
     resultants: np.ndarray
+    ground: sp.csr_matrix | None = None
+    pull: np.ndarray | float = 0.0
 
     @property
     def name(self) -> str:
         return self.body.name
+
+    @property
+    def _stiffness(self) -> sp.csr_matrix:
+        """What the solver solves with, on all unknowns."""
+        return self.body.A if self.ground is None else self.body.A + self.ground
 
     @property
     def unknowns(self) -> int:
@@ -163,7 +172,7 @@ class ElasticBody:
     def _under(self, force: np.ndarray) -> np.ndarray:
         """Displacement (n,) under the loads, supports, plates and nodal forces (n,), with multipliers of zero."""
         body = self.body
-        missing = body.load + force - body.A @ body.prescribed
+        missing = body.load + force + self.pull - self._stiffness @ body.prescribed
         resisted = body.plate_forces + self.extended.T @ missing
         return np.asarray(body.prescribed + self.elastic_modes @ (self.modes[1].T @ resisted) + self.relieved(missing))
 
@@ -234,6 +243,21 @@ class ElasticBody:
 
     def loaded(self, scene: Scene, part: Part) -> ElasticBody:
         return _at_rest(self, reload_body(self.body, scene, part))
+
+    def grounded(self, modulus: float) -> ElasticBody:
+        if self.ground is not None or self.solver.iteration is not None:
+            return self
+        if not is_thin(self.body, self.relieved):
+            return self
+        body, ground = on_ground(self.body, modulus)
+        return condense(body, self.solver.name, self.complete, sp.diags(ground, format="csr"))
+
+    def pulled(self, U: np.ndarray) -> ElasticBody:
+        if self.ground is None:
+            return self
+        motions = self.body.rigid_motions
+        pull = self.ground @ (U - motions.fields @ (motions.forces.T @ U))
+        return _at_rest(replace(self, pull=pull), self.body)
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,7 +371,9 @@ def assemble_elastic(scene: Scene, part: Part, elements: int, zone: float | None
     return AssembledElastic(build_body(scene, part, elements, zone), part)
 
 
-def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> ElasticBody:
+def condense(
+    body: Assembly, solver: str = "auto", entries: bool = True, ground: sp.csr_matrix | None = None
+) -> ElasticBody:
     """Make one body's linear system solvable and condense its plates.
 
     Parameters
@@ -359,6 +385,8 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     entries
         Whether to eliminate the contact unknowns last, so that the factors hold their Schur complement: this makes the
         entries of the compliance cheap, and serves an explicit Q.
+    ground
+        (n, n) stiffness that is added (contactopt.bodies.thin), if any.
 
     Returns
     -------
@@ -369,12 +397,13 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     dofs, n = body.unknowns, len(body.load)
     node, component, place = np.empty(n, int), np.empty(n, int), np.full(n, -1)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
-    kept = np.setdiff1d(body.free, body.rigid_motions.fixing)
+    whole = body.A if ground is None else sp.csr_matrix(body.A + ground)
+    kept = body.free if ground is not None else np.setdiff1d(body.free, body.rigid_motions.fixing)
     place[kept] = np.arange(len(kept))
     interface = np.intersect1d(body.contact_dofs, kept)
     # Factors of A on these unknowns, or multigrid, which needs no copy of A.
     iterative = solver_type(solver, len(kept), len(dofs)).iterative
-    A = Block(body.A, kept) if iterative else body.A[kept][:, kept]
+    A = Block(whole, kept) if iterative else whole[kept][:, kept]
     trailing = place[interface] if entries else None
     made = make_solver(solver, System(A, node[kept], component[kept], body.locations, trailing))
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
@@ -382,24 +411,23 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     relief = _relief(body, made, kept)
     # A plate that alone holds a body along itself moves it as a rigid whole, for which there is nothing to solve.
     extended = _rigid_extension(body)
-    lacking, forces = (np.abs((body.A @ motion)[kept]).max(axis=0, initial=0.0) for motion in (extended, body.motion))
+    lacking, forces = (np.abs((whole @ motion)[kept]).max(axis=0, initial=0.0) for motion in (extended, body.motion))
     strained = lacking > RIGID * forces
     # The extension of the other plate motions M into the body: Z = M - A_ff^-1 A_f: M.
     if strained.any():
-        extended[np.ix_(kept, strained)] -= made.solve((body.A @ extended[:, strained])[kept])
+        extended[np.ix_(kept, strained)] -= made.solve((whole @ extended[:, strained])[kept])
     # Rigid motions are multipliers of their own, so that plate motions have no part along them.
     if len(body.rigid_motions.names):
         extended -= body.rigid_motions.fields @ (body.rigid_motions.forces.T @ extended)
     # The stiffness of the plates, Z' A Z. Its kernel moves freely; the rest are the elastic modes E = Z v /
     # stiffness^1/2.
-    K = extended.T @ (body.A @ extended)
+    K = extended.T @ (whole @ extended)
     stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
-    moves = stiffness <= KERNEL * np.max(np.sum(body.motion * (body.A @ body.motion), axis=0), initial=0.0)
+    moves = stiffness <= KERNEL * np.max(np.sum(body.motion * (whole @ body.motion), axis=0), initial=0.0)
     free = np.eye(len(K)) if moves.all() else vectors[:, moves]  # keep one multiplier per plate component
     modes = free, vectors[:, ~moves] / np.sqrt(stiffness[~moves])
-    return _at_rest(
-        ElasticBody(body, made, kept, interface, body.prescribed, relief, extended, modes, body.plate_forces), body
-    )
+    parts = body, made, kept, interface, body.prescribed, relief, extended, modes, body.plate_forces, ground
+    return _at_rest(ElasticBody(*parts), body)
 
 
 def _relief(body: Assembly, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
@@ -430,7 +458,7 @@ def _rigid_extension(body: Assembly) -> np.ndarray:
 def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:
     """The body `old` under the loads of `body`."""
     # With the prescribed displacements put in, loads act on the free unknowns and on the plates: p + Z' (f - A g).
-    resisted = body.plate_forces + old.extended.T @ (body.load - body.A @ body.prescribed)
+    resisted = body.plate_forces + old.extended.T @ (body.load + old.pull - old._stiffness @ body.prescribed)
     resultants = np.concatenate([old.modes[0].T @ resisted, body.rigid_motions.fields.T @ body.load])
     new = replace(old, body=body, resultants=resultants)
     return replace(new, at_rest=new._under(np.zeros(len(body.load))))

@@ -66,11 +66,13 @@ class Limits(NamedTuple):
 
     imbalance  sum of the nodal forces that nothing balances, relative to that of all forces on the body
     strain     largest principal strain, and rotation  largest rotation [rad], of the mean of an element
+    moved      largest displacement [length]
     """
 
     imbalance: float = 0.0
     strain: float = 0.0
     rotation: float = 0.0
+    moved: float = 0.0
 
 
 def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Limits:
@@ -101,7 +103,8 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Limits:
     turned = mean.swapaxes(1, 2)
     strain = np.abs(np.linalg.eigvalsh((mean + turned) / 2)).max(initial=0.0)
     rotation = np.linalg.norm(mean - turned, axis=(1, 2)).max(initial=0.0) / np.sqrt(8)
-    return Limits(unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation))
+    moved = float(np.abs(U).max(initial=0.0))
+    return Limits(unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation), moved)
 
 
 def fields_of(body: Assembly, U: np.ndarray) -> Fields:

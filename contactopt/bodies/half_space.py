@@ -258,6 +258,12 @@ class HalfSpaceBody:
     def limits(self, U: np.ndarray, force: np.ndarray) -> Limits:
         return Limits()
 
+    def grounded(self, modulus: float) -> HalfSpaceBody:
+        return self
+
+    def pulled(self, U: Any) -> HalfSpaceBody:
+        return self
+
     def loaded(self, scene: Scene, part: HalfSpace) -> HalfSpaceBody:
         """With other values of the total force and of the displacement."""
         return replace(self, part=part)

@@ -595,6 +595,34 @@ class Body(Protocol):
             Zeros for a body that has no equations of its own.
         """
 
+    def grounded(self, modulus: float) -> Body:
+        """Put the body on a soft ground if it is so thin that rounding moves it (contactopt.bodies.thin).
+
+        Parameters
+        ----------
+        modulus
+            Young's modulus of the softest body [stress].
+
+        Returns
+        -------
+        Body
+            Its own self where that is not needed, or where it cannot be told.
+        """
+
+    def pulled(self, U: np.ndarray) -> Body:
+        """Let the ground pull the body towards a displacement.
+
+        Parameters
+        ----------
+        U
+            (n,) displacement [length].
+
+        Returns
+        -------
+        Body
+            The body in other forces of its ground; its own self without one.
+        """
+
     def loaded(self, scene: Any, part: Any) -> Body:
         """Put the loads of another scene on the body.
 

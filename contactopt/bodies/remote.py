@@ -385,6 +385,12 @@ class RemoteBody:
     def limits(self, U: Any, force: np.ndarray) -> Limits:
         return Limits(*self._ask(_limits, U.kept, force))
 
+    def grounded(self, modulus: float) -> RemoteBody:
+        return self
+
+    def pulled(self, U: Any) -> RemoteBody:
+        return self
+
     def loaded(self, scene: Scene, part: Part) -> RemoteBody:
         return _known(self.team, self._keep(_loaded, _sent(scene, part)))
 

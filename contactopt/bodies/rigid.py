@@ -194,6 +194,12 @@ class RigidBody:
     def limits(self, U: np.ndarray, force: np.ndarray) -> Limits:
         return Limits()
 
+    def grounded(self, modulus: float) -> RigidBody:
+        return self
+
+    def pulled(self, U: Any) -> RigidBody:
+        return self
+
     def loaded(self, scene: Scene, part: Rigid) -> RigidBody:
         """With other values of the total force, and other free components if need be."""
         return assemble_rigid(scene, part, 0, None)
