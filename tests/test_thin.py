@@ -28,13 +28,15 @@ def shim(dim, thickness, degree, elements, **held):
     return Scene("shim", layer, block, held.get("mu", 0.0), kind=kind, degree=degree)
 
 
-@pytest.mark.parametrize("thickness", [1e-3, 5e-4, 1e-4])
-@pytest.mark.parametrize("dim,degree,elements", [(2, 1, 16), (2, 2, 16), (3, 1, 6), (3, 2, 5)])
+@pytest.mark.parametrize(
+    "dim,degree,elements,thickness",
+    [(2, 1, 16, 1e-3), (2, 1, 16, 1e-4), (2, 2, 16, 1e-3), (2, 2, 16, 1e-4), (3, 1, 5, 1e-4), (3, 2, 4, 1e-4)],
+)
 def test_a_layer_in_a_uniform_state(dim, degree, elements, thickness):
     made = run(shim(dim, thickness, degree, elements), figures=())
     modulus, mises = (E / (1 - NU**2), np.sqrt(1 - NU + NU**2)) if dim == 2 else (E, 1.0)
     assert made.solution.solved and made.summary["remarks"] == []
-    assert all(body["imbalance"] < 1e-7 for body in made.summary["limits"]["bodies"].values())
+    assert all(body["imbalance"] < 1e-6 for body in made.summary["limits"]["bodies"].values())
     layer = made.fields[0]
     assert layer.displacement[-1].min() == pytest.approx(-(0.5 + thickness) / modulus, rel=1e-4)
     assert np.allclose(layer.von_mises, mises, rtol=1e-3)
@@ -50,7 +52,7 @@ def test_a_layer_that_friction_alone_holds():
 def test_a_coating_between_two_contacts_is_reduced_and_does_not_matter():
     """A coating of the block's material, without friction of its own, passes the pressure of the punch on."""
     peaks = []
-    for thickness in (1e-3, 1e-4):
+    for thickness in (2e-4, 1e-4):
         base = shim(2, thickness, 2, 15)
         layer, block = base.parts
         coat = Part("coat", layer.mesh, SOFT, (Support("x-", {"x": 0.0}),))
