@@ -18,6 +18,7 @@ from contactopt.analysis.quantities import Reading, approach, pressure_reading, 
 from contactopt.analysis.resolution import remarks
 from contactopt.analysis.resultants import mirrors, tables
 from contactopt.analysis.solve_scene import Options, Solved
+from contactopt.analysis.validity import validity
 from contactopt.bodies.ranks import Team, spread
 from contactopt.cards import card, count, line
 from contactopt.errors import InputError
@@ -74,7 +75,7 @@ class Result:
             "status": f"{s['status']}: {self.solution.message}",
             "residual (certificate)": f"{s['residual']:.2e}",
             "unknowns, contacts": f"{s['dofs']}, {s['contact_nodes']}",
-            "normal force": f"{s['normal_force']:.6g} {stress} {length}^2",
+            "sum of normal forces": f"{s['normal_force']:.6g} {stress} {length}^2",
             "largest pressure": f"{s['max_pressure']:.6g} {stress}",
         }
         for key in ("approach", "contact_half_width", "stick_half_width"):
@@ -412,6 +413,7 @@ def _summary(
     single = len(problem.pairs) == 1
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
+    limits, beyond = validity(reduction, solution)
     summary: dict[str, Any] = {
         "scene": reduction.scene.name,
         "kind": reduction.scene.kind,
@@ -435,8 +437,9 @@ def _summary(
         "pressure": None if peak is None else peak.value,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
-        "remarks": [*remarks(reduction, solution), *([] if peak is None else _smoothed(peak, largest))],
+        "remarks": [*remarks(reduction, solution), *beyond, *([] if peak is None else _smoothed(peak, largest))],
         **found,
+        "limits": limits,
     }
     if path is not None:
         keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]

@@ -236,3 +236,11 @@ def test_a_tall_tower_of_many_bodies_stands_up_to_its_limit(side, holds):
     else:
         with pytest.raises(InputError, match="more than the contacts can hold"):
             solve(reduce_bodies(scene).problem)
+
+
+def test_a_rigid_normal_on_the_wrong_side_is_refused():
+    """A floor whose normal points down would hold a block that is pulled up."""
+    part = Part("b", block([0.0, 0.0], [1.0, 1.0], [2, 2]), SOFT, loads=(BodyForce((0.0, 2.0)),), contact="bottom")
+    for floor in (Rigid("floor", normal=(0, -1)), Rigid("floor", normal=(0, -2), gap=lambda x: x[1] + x[0] ** 2)):
+        with pytest.raises(InputError, match="points away from body 'b'"):
+            reduce_bodies(alone(part, floor))

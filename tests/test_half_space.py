@@ -41,6 +41,30 @@ def ball(n=20, law="coulomb", mu=0.3, shear=0.4, m=None, lower=STEEL, upper=None
     return Scene("ball", above, HalfSpace("base", lower, points, **changes), mu, kind="solid", law=law)
 
 
+@pytest.mark.parametrize("dim,periodic,lower", [(2, False, True), (2, True, False), (3, False, False), (3, True, True)])
+def test_the_height_counts_beside_a_flat_rigid_body(dim, periodic, lower):
+    """It gives the answer of the same shape as a gap, whichever body it is on, and of a rigid half-space."""
+    points, axis = (ticks(12),) * (dim - 1), "xyz"[dim - 1]
+    force = {axis: -3.0}
+
+    def height(x):
+        return 0.02 * np.cos(x[0]) - np.sum(x**2, axis=0) / 20
+
+    def largest(rigid, **shape):
+        own = HalfSpace("base", STEEL, points, periodic=periodic, force=None if lower else force, **shape)
+        bodies = (rigid, own) if lower else (own, rigid)
+        scene = Scene("s", *bodies, 0.3, kind="plane-strain" if dim == 2 else "solid")
+        return contactopt.run(scene, figures=()).summary["max_pressure"]
+
+    held = {"force": force if lower else None}
+    by_gap = largest(Rigid("top", gap=lambda x: -height(x[:-1]), **held))
+    assert largest(Rigid("top", **held), height=height) == pytest.approx(by_gap, rel=1e-9)
+    stiff = HalfSpace("top", Material(1e9, 0.3), points, periodic=periodic, **held)
+    assert largest(stiff, height=height) == pytest.approx(by_gap, rel=1e-5)
+    with pytest.raises(InputError, match="give one of them"):
+        largest(Rigid("top", gap=lambda x: -height(x[:-1]), **held), height=height)
+
+
 PLACES = [((1.0, 0.7), place) for place in [(0, 0), (1, 0), (0, 1), (3, 2), (12, 5), (13, 13), (40, 2), (70, 66)]]
 
 

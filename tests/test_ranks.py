@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -176,6 +177,29 @@ def test_slices_tied_to_each_other_are_the_whole_body(dim, name):
     assert pieces.solved and len(cut.pairs) == 3
     error = np.abs(pieces.reactions[cut.pairs[0].contacts] - whole.reactions).max()
     assert error < 1e-9 * np.abs(whole.reactions).max()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_slices_of_quadratic_simplices_are_the_whole_body(dim):
+    """No node of the cut may be left behind, not those in the middle of edges either."""
+
+    def simplices(part):
+        def mesh(elements, zone):
+            old = part.mesh(elements, zone)
+            new = old.to_meshtri() if dim == 2 else old.to_meshtet()
+            outer = np.isin(np.arange(new.facets.shape[1]), new.boundary_facets())
+            there = {name: np.unique(old.facets[:, own]) for name, own in old.boundaries.items()}
+            return new.with_boundaries(
+                {name: np.flatnonzero(np.isin(new.facets, at).all(axis=0) & outer) for name, at in there.items()}
+            )
+
+        return replace(part, mesh=mesh)
+
+    scene = replace(scenes.flat_punch(dim, elements=4 if dim == 2 else 2), degree=2).with_parts(simplices)
+    cut = reduce(sliced(scene, "foundation", 2), Q="explicit")
+    whole, pieces = solve(reduce(scene, Q="explicit"), tol=1e-11), solve(cut, tol=1e-11)
+    error = np.abs(pieces.reactions[cut.pairs[0].contacts] - whole.reactions).max()
+    assert error < 1e-11 * np.abs(whole.reactions).max()
 
 
 def test_what_cannot_be_sliced_is_refused():

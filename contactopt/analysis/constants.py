@@ -23,6 +23,12 @@ COARSEST = 4  # elements across the contact half-width of the first of nested me
 FACTOR = {2: 8, 3: 4}  # coarser than the next of them, where bodies are factorised: a 64th of the unknowns
 ROUGH = 1e-6  # certificate asked of a coarse mesh: its own error is larger
 
+# Thin bodies on a ground (contactopt.bodies.thin).
+BALANCED = 1e-8  # share of the forces on a body that its ground may still bear, and misfit of its surfaces
+BEARABLE = 1e-4  # what it may bear where it gets no less; beyond, the body bends by itself and needs no ground
+ROUNDS = 12  # of problems with the ground
+SLOW = 0.7  # share of the last round's imbalance from which on a round is of no use
+
 # Refinement (contactopt.accuracy).
 FIRST = {2: 8, 3: 4}  # elements across the half-width of the first mesh, at least, by dimension
 BELOW = 8  # by how much fewer than the scene's default they are

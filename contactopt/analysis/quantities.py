@@ -25,6 +25,8 @@ from contactopt.problem.chart import ON_PLANE
 if TYPE_CHECKING:
     from contactopt.interface.reduction import Reduction
 
+CLOSED = 1e-3  # a mean motion below this share of the mean size is that of a surface around a body
+
 
 def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
     """How far the plates bring the bodies together along the mean normal.
@@ -39,12 +41,13 @@ def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
     Returns
     -------
     float or None
-        [length]; None without a plate.
+        [length]; None without a plate, and where the surface surrounds a body, so that its normals have no mean.
     """
     if len(solution.multipliers) == 0:
         return None
     normal = (problem.V @ solution.multipliers).reshape(problem.q.shape)[:, 0]
-    return -float(np.average(normal, weights=problem.areas))
+    mean, size = (float(np.average(motion, weights=problem.areas)) for motion in (normal, np.abs(normal)))
+    return None if size > 0 and abs(mean) < CLOSED * size else -mean
 
 
 def elastic_energy(reduction: Reduction, solution: Solution) -> float:

@@ -12,7 +12,9 @@ from contactopt.analysis.status import contact_status
 from contactopt.interface.charts import SymmetryPlane
 from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution, alone
+from contactopt.scenes.scene import COMPONENTS
 
+ROUNDING = 1e-9  # components below this share of the force are written as zero
 ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and still lie along it
 
 
@@ -65,28 +67,6 @@ def _resultant(
     return Resultant(forces.sum(axis=1), moment if len(points) == 3 else moment[2:])
 
 
-def planes_of(reduction: Reduction) -> tuple[SymmetryPlane, ...]:
-    """Collect the planes of symmetry of a scene whose bodies are parts of the whole ones.
-
-    Parameters
-    ----------
-    reduction
-        The reduction of the scene.
-
-    Returns
-    -------
-    tuple
-        Its planes, each once; none where the bodies are whole.
-    """
-    if reduction.scene.copies == 1:
-        return ()
-    found: list[SymmetryPlane] = []
-    for plane in (plane for made in reduction.couplings for plane in made.planes):
-        if not any(abs(plane.inward @ other.inward) > 0.5 for other in found):
-            found.append(plane)
-    return tuple(found)
-
-
 def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
     """Find the planes beyond which mirror images make the bodies whole.
 
@@ -105,7 +85,7 @@ def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
     if scene.kind == "axisymmetric":
         return [{"axis": scene.components[0], "place": 0.0}]
     made = []
-    for plane in planes_of(reduction):
+    for plane in reduction.planes:
         axis = int(np.argmax(np.abs(plane.inward)))
         if abs(plane.inward[axis]) < 1 - ALONG:
             return []
@@ -147,7 +127,7 @@ def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resul
         The resultants by the names of the pairs.
     """
     forces, points = space_forces(reduction, solution), reduction.problem.coordinates
-    ring, planes = reduction.scene.kind == "axisymmetric", planes_of(reduction)
+    ring, planes = reduction.scene.kind == "axisymmetric", reduction.planes
     return {
         pair.name: _resultant(points[:, pair.contacts], forces[:, pair.contacts], ring, planes)
         for pair in reduction.problem.pairs
@@ -169,7 +149,7 @@ def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Res
     dict
         The resultants by names such as "body 'block', support 'bottom'".
     """
-    ring, planes = reduction.scene.kind == "axisymmetric", planes_of(reduction)
+    ring, planes = reduction.scene.kind == "axisymmetric", reduction.planes
     found = {}
     displaced = reduction.displaced(solution)
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
@@ -202,6 +182,27 @@ def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Sol
         problem, own = alone(reduction.problem, solution, pair)
         made.append((replace(reduction, problem=problem, couplings=(coupling,)), own))
     return made
+
+
+def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
+    """Put the contact force of every pair into words: normal forces of a curved surface add up to more than it.
+
+    Parameters
+    ----------
+    summary
+        Of a result, with its `kind` and `pairs`.
+
+    Returns
+    -------
+    dict
+        For the name of each pair the components of the force on its upper body, without their unit.
+    """
+    axes = COMPONENTS[summary["kind"]]
+    words = {}
+    for name, pair in summary["pairs"].items():
+        least = ROUNDING * max(map(abs, (*pair["force"], pair["normal_force"])))
+        words[name] = ", ".join(f"{axis} {f if abs(f) > least else 0.0:.6g}" for axis, f in zip(axes, pair["force"]))
+    return words
 
 
 def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:

@@ -19,10 +19,13 @@ from skfem.helpers import dot
 from contactopt.bodies.elements import SHAPES, Trace, contact_trace, make_basis, node_unknowns, straight, weight_at
 from contactopt.bodies.mirror_planes import mirrored_nodes
 from contactopt.bodies.motions import Motions, check_free, free_motions
+from contactopt.bodies.protocol import Guides
 from contactopt.bodies.stiffness import isotropic_stiffness, stiffness
 from contactopt.errors import InputError
 from contactopt.material import Material, lame_by_poisson
 from contactopt.scenes.scene import Part, Plate, Scene, Traction
+
+PLANE = 1e-9  # nodes lie in a plane within this fraction of the body's extent
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +162,10 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     prescribed, held, motion, plate_forces, driven, holders = _constraints(scene, part, basis)
     rigid_motions = free_motions(scene.kind, scene.components, basis, node_unknowns(basis), held, weight)
     check_free(part.name, A, rigid_motions)
-    surfaces = scene.surfaces_of(part)
-    contacts = {name: contact_trace(basis, scene.degree, mesh.boundaries[name], weight) for name in surfaces}
+    contacts = {
+        name: contact_trace(basis, scene.degree, mesh.boundaries[name], weight, scene.laws_of(part, name) == {"tied"})
+        for name in scene.surfaces_of(part)
+    }
     return Assembly(
         part.name,
         scene.kind,
@@ -179,6 +184,39 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         holders,
         mirrored_nodes(scene, part, basis, held),
     )
+
+
+def guides_of(body: Assembly, part: Part) -> Guides:
+    """Find the extent of a body and the planes on which supports hold it along the normal of the plane alone, at zero.
+
+    Parameters
+    ----------
+    body
+        The assembled body.
+    part
+        Its part of the scene.
+
+    Returns
+    -------
+    Guides
+        The extent and the planes that lie across a coordinate axis and have the whole body on one side.
+    """
+    x = body.locations
+    extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
+    near = PLANE * float(np.ptp(extent, axis=1).max())
+    planes = []
+    names = {"plane-strain": "xy", "axisymmetric": "rz", "solid": "xyz"}[body.kind]
+    for support in part.supports:
+        given = support.displacement or {}
+        if list(given.values()) != [0.0]:
+            continue
+        axis = names.index(next(iter(given)))
+        nodes = body.basis.mesh.facets[:, np.asarray(body.basis.mesh.boundaries[support.boundary])]
+        low, high = extent[axis]
+        for place, sign in ((low, 1.0), (high, -1.0)):
+            if np.all(np.abs(body.basis.mesh.p[axis, nodes] - place) <= near):
+                planes.append((axis, float(place), sign))
+    return Guides(extent, tuple(planes))
 
 
 def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:

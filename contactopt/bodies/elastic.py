@@ -25,13 +25,14 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.body import Assembly, build_body, reload_body
+from contactopt.bodies.body import Assembly, build_body, guides_of, reload_body
 from contactopt.bodies.elements import face_nodes
-from contactopt.bodies.fields import Fields, fields_of, recovery_errors
-from contactopt.bodies.protocol import Equilibrium, Mesh, Region, Surface
+from contactopt.bodies.fields import Fields, Limits, fields_of, limits_of, recovery_errors
+from contactopt.bodies.protocol import Equilibrium, Guides, Mesh, Region, Surface
 from contactopt.bodies.recovery import StressMap, stress_map
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
+from contactopt.bodies.thin import is_thin, on_ground
 from contactopt.errors import InputError
 from contactopt.problem.operators import Product
 from contactopt.scenes.curves import check_curve
@@ -54,6 +55,7 @@ class ElasticBody:
     modes       (j, p) and (j, j - p) combinations of them that move freely, and those with elastic resistance, scaled so
                 that the elastic modes E = Z modes[1] add E E' to the compliance
     resultants  (p + i,) resultants s of the loads in the free motions, those of plates first
+    ground      (n, n) stiffness of a ground that holds the body meanwhile, and pull (n,) its forces (contactopt.bodies.thin)
     """
 
     body: Assembly
@@ -65,10 +67,17 @@ class ElasticBody:
     extended: np.ndarray
     modes: tuple[np.ndarray, np.ndarray]
     resultants: np.ndarray
+    ground: sp.csr_matrix | None = None
+    pull: np.ndarray | float = 0.0
 
     @property
     def name(self) -> str:
         return self.body.name
+
+    @property
+    def _stiffness(self) -> sp.csr_matrix:
+        """What the solver solves with, on all unknowns."""
+        return self.body.A if self.ground is None else self.body.A + self.ground
 
     @property
     def unknowns(self) -> int:
@@ -158,8 +167,15 @@ class ElasticBody:
             U = self.at_rest + self.motions @ multipliers + left @ (right.T @ force)
             U[self.equilibrium.free] += free
             return np.asarray(U)
-        U = self.at_rest + self.elastic_modes @ (self.elastic_modes.T @ force) + self.motions @ multipliers
-        return np.asarray(U + self.relieved(force))
+        # One solve for loads and contact forces together: in a thin body each alone moves it far.
+        return np.asarray(self._under(force) + self.motions @ multipliers)
+
+    def _under(self, force: np.ndarray) -> np.ndarray:
+        """Displacement (n,) under the loads, supports, plates and nodal forces (n,), with multipliers of zero."""
+        body = self.body
+        missing = body.load + force + self.pull - self._stiffness @ body.prescribed
+        resisted = body.plate_forces + self.extended.T @ missing
+        return np.asarray(body.prescribed + self.elastic_modes @ (self.modes[1].T @ resisted) + self.relieved(missing))
 
     def relieved(self, force: np.ndarray) -> np.ndarray:
         """Displacements (n,) or (n, j) under nodal forces on the free unknowns, with plates at rest."""
@@ -210,6 +226,12 @@ class ElasticBody:
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
 
+    def seen(self, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
+        return np.asarray(T @ U)
+
+    def limits(self, U: np.ndarray, force: np.ndarray) -> Limits:
+        return limits_of(self.body, U, force)
+
     def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
         return recovery_errors(self.body, U, *others)
 
@@ -222,6 +244,21 @@ class ElasticBody:
 
     def loaded(self, scene: Scene, part: Part) -> ElasticBody:
         return _at_rest(self, reload_body(self.body, scene, part))
+
+    def grounded(self, modulus: float) -> ElasticBody:
+        if self.ground is not None or self.solver.iteration is not None:
+            return self
+        if not is_thin(self.body, self.relieved):
+            return self
+        body, ground = on_ground(self.body, modulus)
+        return condense(body, self.solver.name, self.complete, sp.diags(ground, format="csr"))
+
+    def pulled(self, U: np.ndarray) -> ElasticBody:
+        if self.ground is None:
+            return self
+        motions = self.body.rigid_motions
+        pull = self.ground @ (U - motions.fields @ (motions.forces.T @ U))
+        return _at_rest(replace(self, pull=pull), self.body)
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,6 +324,9 @@ class AssembledElastic:
             Mesh(kind, body.degree, faces, outward, body.weight, body.locations, unknowns, held, curve),
         )
 
+    def guides(self) -> Guides:
+        return guides_of(self.body, self.part)
+
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
         raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
 
@@ -333,7 +373,9 @@ def assemble_elastic(scene: Scene, part: Part, elements: int, zone: float | None
     return AssembledElastic(build_body(scene, part, elements, zone), part)
 
 
-def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> ElasticBody:
+def condense(
+    body: Assembly, solver: str = "auto", entries: bool = True, ground: sp.csr_matrix | None = None
+) -> ElasticBody:
     """Make one body's linear system solvable and condense its plates.
 
     Parameters
@@ -345,6 +387,8 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     entries
         Whether to eliminate the contact unknowns last, so that the factors hold their Schur complement: this makes the
         entries of the compliance cheap, and serves an explicit Q.
+    ground
+        (n, n) stiffness that is added (contactopt.bodies.thin), if any.
 
     Returns
     -------
@@ -355,12 +399,13 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     dofs, n = body.unknowns, len(body.load)
     node, component, place = np.empty(n, int), np.empty(n, int), np.full(n, -1)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
-    kept = np.setdiff1d(body.free, body.rigid_motions.fixing)
+    whole = body.A if ground is None else sp.csr_matrix(body.A + ground)
+    kept = body.free if ground is not None else np.setdiff1d(body.free, body.rigid_motions.fixing)
     place[kept] = np.arange(len(kept))
     interface = np.intersect1d(body.contact_dofs, kept)
     # Factors of A on these unknowns, or multigrid, which needs no copy of A.
     iterative = solver_type(solver, len(kept), len(dofs)).iterative
-    A = Block(body.A, kept) if iterative else body.A[kept][:, kept]
+    A = Block(whole, kept) if iterative else whole[kept][:, kept]
     trailing = place[interface] if entries else None
     made = make_solver(solver, System(A, node[kept], component[kept], body.locations, trailing))
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
@@ -368,24 +413,23 @@ def condense(body: Assembly, solver: str = "auto", entries: bool = True) -> Elas
     relief = _relief(body, made, kept)
     # A plate that alone holds a body along itself moves it as a rigid whole, for which there is nothing to solve.
     extended = _rigid_extension(body)
-    lacking, forces = (np.abs((body.A @ motion)[kept]).max(axis=0, initial=0.0) for motion in (extended, body.motion))
+    lacking, forces = (np.abs((whole @ motion)[kept]).max(axis=0, initial=0.0) for motion in (extended, body.motion))
     strained = lacking > RIGID * forces
     # The extension of the other plate motions M into the body: Z = M - A_ff^-1 A_f: M.
     if strained.any():
-        extended[np.ix_(kept, strained)] -= made.solve((body.A @ extended[:, strained])[kept])
+        extended[np.ix_(kept, strained)] -= made.solve((whole @ extended[:, strained])[kept])
     # Rigid motions are multipliers of their own, so that plate motions have no part along them.
     if len(body.rigid_motions.names):
         extended -= body.rigid_motions.fields @ (body.rigid_motions.forces.T @ extended)
     # The stiffness of the plates, Z' A Z. Its kernel moves freely; the rest are the elastic modes E = Z v /
     # stiffness^1/2.
-    K = extended.T @ (body.A @ extended)
+    K = extended.T @ (whole @ extended)
     stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
-    moves = stiffness <= KERNEL * np.max(np.sum(body.motion * (body.A @ body.motion), axis=0), initial=0.0)
+    moves = stiffness <= KERNEL * np.max(np.sum(body.motion * (whole @ body.motion), axis=0), initial=0.0)
     free = np.eye(len(K)) if moves.all() else vectors[:, moves]  # keep one multiplier per plate component
     modes = free, vectors[:, ~moves] / np.sqrt(stiffness[~moves])
-    return _at_rest(
-        ElasticBody(body, made, kept, interface, body.prescribed, relief, extended, modes, body.plate_forces), body
-    )
+    parts = body, made, kept, interface, body.prescribed, relief, extended, modes, body.plate_forces, ground
+    return _at_rest(ElasticBody(*parts), body)
 
 
 def _relief(body: Assembly, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
@@ -416,10 +460,7 @@ def _rigid_extension(body: Assembly) -> np.ndarray:
 def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:
     """The body `old` under the loads of `body`."""
     # With the prescribed displacements put in, loads act on the free unknowns and on the plates: p + Z' (f - A g).
-    residual = body.load - body.A @ body.prescribed
-    resisted = body.plate_forces + old.extended.T @ residual
-    # The displacement without contact forces: that of supports, of the resisted plate motions, and of the free
-    # unknowns.
-    at_rest = body.prescribed + old.elastic_modes @ (old.modes[1].T @ resisted) + old.relieved(residual)
+    resisted = body.plate_forces + old.extended.T @ (body.load + old.pull - old._stiffness @ body.prescribed)
     resultants = np.concatenate([old.modes[0].T @ resisted, body.rigid_motions.fields.T @ body.load])
-    return replace(old, body=body, at_rest=at_rest, resultants=resultants)
+    new = replace(old, body=body, resultants=resultants)
+    return replace(new, at_rest=new._under(np.zeros(len(body.load))))

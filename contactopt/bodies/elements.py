@@ -62,6 +62,8 @@ FACES = {
     "RefTet": (*_TRIANGLE, np.array([[0, 1, 2]])),
     "RefHex": (*_SQUARE, np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])),
 }
+# cells whose nodes are all those of a quadratic face: a tied surface must leave no node of it behind
+TIED = {"RefTri": FACES["RefQuad"][3], "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]])}
 NOISE = 1e-14  # what rounding leaves of a zero
 
 
@@ -281,7 +283,9 @@ def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
     return np.concatenate([np.asarray(dofs) for dofs in kinds if np.size(dofs)], axis=1)
 
 
-def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: tuple[float, bool]) -> Trace:
+def contact_trace(
+    basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: tuple[float, bool], tied: bool = False
+) -> Trace:
     """Make the trace of the displacement on a boundary, with contact nodes, nodal areas and normals.
 
     Parameters
@@ -294,6 +298,8 @@ def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, wei
         (f,) numbers of the facets of the mesh.
     weight
         The measure of the integrals, as for `weight_at`.
+    tied
+        Whether every node of the boundary shall be a contact, as where it is tied to another body.
 
     Returns
     -------
@@ -305,6 +311,8 @@ def contact_trace(basis: skfem.CellBasis, degree: int, boundary: np.ndarray, wei
     if degree == 1:
         cells = np.arange(cells.shape[1])[None]  # the whole face
         places = places[:, cells[0]]
+    elif tied:
+        cells = TIED.get(name, cells)
     # Values phi_v of the hat functions at the quadrature points of a cell, N_j of the shape functions at all of them.
     phi, rule = _cell_rule(name, places, cells, degree)
     at = _face_basis(basis.mesh, shape, boundary, rule)

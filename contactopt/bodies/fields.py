@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import skfem
@@ -59,6 +59,52 @@ class Fields:
         data = {"displacement": vectors, "von_mises": self.von_mises, **flat, **self.contact}
         points = np.pad(self.mesh.p.T, ((0, 0), (0, 3 - len(self.mesh.p))))
         meshio.Mesh(points, [elements_of(self.mesh)], data).write(path, file_format="vtu")
+
+
+class Limits(NamedTuple):
+    """What small displacements and the equations of a body are worth at a displacement.
+
+    imbalance  sum of the nodal forces that nothing balances, relative to that of all forces on the body
+    strain     largest principal strain, and rotation  largest rotation [rad], of the mean of an element
+    moved      largest displacement [length]
+    """
+
+    imbalance: float = 0.0
+    strain: float = 0.0
+    rotation: float = 0.0
+    moved: float = 0.0
+
+
+def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Limits:
+    """Compute how far a body is from equilibrium, strained and turned, from its stiffness and its elements alone.
+
+    Parameters
+    ----------
+    body
+        The assembled body of n unknowns.
+    U
+        (n,) displacement [length].
+    force
+        (n,) contact forces on its unknowns [force].
+
+    Returns
+    -------
+    Limits
+        The imbalance counts the free unknowns and, for each plate that moves, the sum over its unknowns.
+    """
+    internal = body.A @ U
+    missing = internal - body.load - force
+    plates = body.motion.T @ missing - body.plate_forces
+    sizes = (np.abs(part).sum() for part in (force, body.load, body.plate_forces, np.delete(internal, body.free)))
+    size = max(sizes)
+    unbalanced = float(np.abs(missing[body.free]).sum() + np.abs(plates).sum())
+    gradient = np.asarray(body.basis.interpolate(U).grad)
+    mean = np.einsum("abeq,eq->eab", gradient, body.basis.dx) / body.basis.dx.sum(axis=1)[:, None, None]
+    turned = mean.swapaxes(1, 2)
+    strain = np.abs(np.linalg.eigvalsh((mean + turned) / 2)).max(initial=0.0)
+    rotation = np.linalg.norm(mean - turned, axis=(1, 2)).max(initial=0.0) / np.sqrt(8)
+    moved = float(np.abs(U).max(initial=0.0))
+    return Limits(unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation), moved)
 
 
 def fields_of(body: Assembly, U: np.ndarray) -> Fields:
@@ -121,9 +167,6 @@ def nodal_stress(body: Assembly, U: np.ndarray, everywhere: bool = True) -> np.n
 
 def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
     """Estimate for every element how much it adds to the error of the energy, or of other functionals.
-
-    For each other field W these are the integrals of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)).
-
 
     For every element this is the integral of (s*(U) - s(U)) : C^-1 : (s*(W) - s(W)). s is the stress of a displacement
     and s* the continuous stress with its averages at the vertices, which is more accurate where the solution is smooth.

@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.bodies.fields import Limits
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
-from contactopt.bodies.protocol import Surface
+from contactopt.bodies.protocol import Guides, Surface
 from contactopt.errors import InputError
 from contactopt.material import Material, lame
 from contactopt.problem.chart import Chart
@@ -144,6 +145,9 @@ class HalfSpaceBody:
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
         raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
 
+    def guides(self) -> Guides:
+        return Guides(np.zeros((len(self.components), 0)))
+
     def iterates(self, solver: str) -> bool:
         """Its products are so cheap that an array of its compliance never pays."""
         return True
@@ -247,6 +251,18 @@ class HalfSpaceBody:
 
     def fields(self, U: np.ndarray) -> None:
         return None
+
+    def seen(self, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
+        return np.asarray(T @ U)
+
+    def limits(self, U: np.ndarray, force: np.ndarray) -> Limits:
+        return Limits()
+
+    def grounded(self, modulus: float) -> HalfSpaceBody:
+        return self
+
+    def pulled(self, U: Any) -> HalfSpaceBody:
+        return self
 
     def loaded(self, scene: Scene, part: HalfSpace) -> HalfSpaceBody:
         """With other values of the total force and of the displacement."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -25,7 +25,7 @@ import scipy.sparse as sp
 from contactopt.problem.coupled import BodyTerm, LocalTerm
 
 if TYPE_CHECKING:
-    from contactopt.bodies.fields import Fields
+    from contactopt.bodies.fields import Fields, Limits
     from contactopt.bodies.recovery import StressMap
     from contactopt.problem.chart import Chart
     from contactopt.problem.convolution import Kernel
@@ -135,6 +135,18 @@ class Surface:
     chart: Chart | None = None
 
 
+class Guides(NamedTuple):
+    """Where a body is, and which planes guide it.
+
+    extent  (dim, 2) least and largest coordinates [length]; (dim, 0) for a body without nodes
+    planes  axis, place [length] and the side (1 or -1) on which the body lies, of each plane across a coordinate axis on
+            which a support holds the displacement along this axis alone, at zero
+    """
+
+    extent: np.ndarray
+    planes: tuple[tuple[int, float, float], ...] = ()
+
+
 class AssembledBody(Protocol):
     """A body whose surface and size are known, before its linear system is made solvable.
 
@@ -190,6 +202,15 @@ class AssembledBody(Protocol):
         tuple
             The surface, which holds the contact normals to be used (they may be the body's own), and the initial gap
             (k,) [length].
+        """
+
+    def guides(self) -> Guides:
+        """Find where the body is and which planes guide it.
+
+        Returns
+        -------
+        Guides
+            Its extent, and planes that may be planes of symmetry.
         """
 
     def iterates(self, solver: str) -> bool:
@@ -540,6 +561,66 @@ class Body(Protocol):
         -------
         Fields or None
             The fields; None for a body without any.
+        """
+
+    def seen(self, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
+        """Compute T U, the displacement of the contacts.
+
+        Parameters
+        ----------
+        T
+            (rows, n) sparse map of the contact unknowns.
+        U
+            (n,) displacement of the body [length].
+
+        Returns
+        -------
+        ndarray
+            (rows,) [length].
+        """
+
+    def limits(self, U: np.ndarray, force: np.ndarray) -> Limits:
+        """Tell how far the body is from equilibrium, strained and turned (contactopt.bodies.fields).
+
+        Parameters
+        ----------
+        U
+            (n,) displacement of the body [length].
+        force
+            (n,) contact forces on it [force].
+
+        Returns
+        -------
+        Limits
+            Zeros for a body that has no equations of its own.
+        """
+
+    def grounded(self, modulus: float) -> Body:
+        """Put the body on a soft ground if it is so thin that rounding moves it (contactopt.bodies.thin).
+
+        Parameters
+        ----------
+        modulus
+            Young's modulus of the softest body [stress].
+
+        Returns
+        -------
+        Body
+            Its own self where that is not needed, or where it cannot be told.
+        """
+
+    def pulled(self, U: np.ndarray) -> Body:
+        """Let the ground pull the body towards a displacement.
+
+        Parameters
+        ----------
+        U
+            (n,) displacement [length].
+
+        Returns
+        -------
+        Body
+            The body in other forces of its ground; its own self without one.
         """
 
     def loaded(self, scene: Any, part: Any) -> Body:

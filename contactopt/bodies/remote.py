@@ -18,8 +18,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.elastic import AssembledElastic, ElasticBody, assemble_elastic
-from contactopt.bodies.fields import Fields
-from contactopt.bodies.protocol import Surface
+from contactopt.bodies.fields import Fields, Limits
+from contactopt.bodies.protocol import Guides, Surface
 from contactopt.bodies.ranks import Kept, RemotePart, Team, shipped, values_of
 from contactopt.errors import InputError
 from contactopt.problem.coupled import LocalTerm
@@ -224,6 +224,14 @@ def _fields(own: Resident, U: np.ndarray) -> Fields:
     return own.body.fields(U)
 
 
+def _seen(own: Resident, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
+    return own.body.seen(own.wide(T), U)
+
+
+def _limits(own: Resident, U: np.ndarray, F: np.ndarray) -> Limits:
+    return own.body.limits(U, own.force(F))
+
+
 def _loaded(own: Resident, sent: bytes) -> Resident:
     return replace(own, body=own.body.loaded(*pickle.loads(sent)))
 
@@ -371,6 +379,18 @@ class RemoteBody:
         found: Fields = self._ask(_fields, U.kept)
         return found
 
+    def seen(self, T: sp.csr_matrix, U: Any) -> np.ndarray:
+        return np.asarray(self._ask(_seen, T, U.kept))
+
+    def limits(self, U: Any, force: np.ndarray) -> Limits:
+        return Limits(*self._ask(_limits, U.kept, force))
+
+    def grounded(self, modulus: float) -> RemoteBody:
+        return self
+
+    def pulled(self, U: Any) -> RemoteBody:
+        return self
+
     def loaded(self, scene: Scene, part: Part) -> RemoteBody:
         return _known(self.team, self._keep(_loaded, _sent(scene, part)))
 
@@ -403,6 +423,9 @@ class AssembledRemote:
     @property
     def interface_unknowns(self) -> int:
         return self._sizes[1]
+
+    def guides(self) -> Guides:
+        return Guides(*self._ask(AssembledElastic.guides))
 
     def iterates(self, solver: str) -> bool:
         return bool(self._ask(AssembledElastic.iterates, solver))

@@ -14,13 +14,15 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import Surface
+from contactopt.bodies.fields import Limits
+from contactopt.bodies.protocol import Guides, Surface
 from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.problem.operators import Product
 from contactopt.scenes.scene import Rigid, Scene
 
 log = logging.getLogger(__name__)
+NEAREST = 1e-9  # contacts are as near as the nearest one up to this fraction of the gaps
 FLAT = 1e-3  # normals of a surface that differ by less than this are one direction
 
 
@@ -67,7 +69,7 @@ class RigidBody:
         raise InputError(f"rigid body '{self.name}' has no contact surface of its own; it needs a body with a mesh.")
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
-        dim, k = other.points.shape
+        (dim, k), suggested = other.points.shape, normals
         if self.part.normal is not None:
             own = np.array(self.part.normal, dtype=float)
             normals = np.tile(own[:, None] / np.linalg.norm(own), k)
@@ -84,17 +86,46 @@ class RigidBody:
         surface = Surface(
             self.name, other.points, normals, other.areas, other.weights, other.places, tuple(trace), held, other.cells
         )
-        return surface, self._gap(other)
+        gap = self._gap(other)
+        self._check_side(other, np.sum(normals * suggested, axis=0), gap)
+        return surface, gap
+
+    def _check_side(self, other: Surface, facing: np.ndarray, gap: np.ndarray) -> None:
+        """Refuse a normal that points away from the other body where the bodies are nearest.
+
+        `facing` (k,) is the cosine between the normal and the one that the other body suggests.
+        """
+        nearest = gap <= gap.min(initial=np.inf) + NEAREST * float(np.max(np.abs(gap), initial=0.0))
+        if (
+            self.part.normal is not None
+            and np.sum((facing * other.areas)[nearest]) < -FLAT * other.areas[nearest].sum()
+        ):
+            raise InputError(
+                f"rigid body '{self.name}': its normal points away from body '{other.body}' where they are "
+                "nearest; a contact normal points from the lower body to the upper one, so turn its sign."
+            )
 
     def _gap(self, other: Surface) -> np.ndarray:
         """The initial gap at the contacts from that at the nodes, with the weights of the displacements."""
-        if self.part.gap is None:
+        if other.mesh is None:  # its points lie in a plane, its places on the surface
+            height = np.sum(other.normals * (other.places - other.points), axis=0)
+            if self.part.gap is None:
+                return -height
+            if height.any():
+                raise InputError(
+                    f"rigid body '{self.name}' has a gap and half-space '{other.body}' a height; give one of them, "
+                    "which then stands for both surfaces."
+                )
+        elif self.part.gap is None:
             return np.zeros(other.points.shape[1])
         given = self.part.gap(other.places) if callable(self.part.gap) else self.part.gap
         gap = real_array(f"the gap of rigid body '{self.name}'", given).ravel()
         if gap.shape != other.places.shape[1:] or not np.all(np.isfinite(gap)):
             raise InputError(f"the gap of rigid body '{self.name}' must give one finite number per contact node.")
         return np.asarray(other.weights @ gap)
+
+    def guides(self) -> Guides:
+        return Guides(np.zeros((len(self.components), 0)))
 
     def iterates(self, solver: str) -> bool:
         return False
@@ -156,6 +187,18 @@ class RigidBody:
 
     def fields(self, U: np.ndarray) -> None:
         return None
+
+    def seen(self, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
+        return np.asarray(T @ U)
+
+    def limits(self, U: np.ndarray, force: np.ndarray) -> Limits:
+        return Limits()
+
+    def grounded(self, modulus: float) -> RigidBody:
+        return self
+
+    def pulled(self, U: Any) -> RigidBody:
+        return self
 
     def loaded(self, scene: Scene, part: Rigid) -> RigidBody:
         """With other values of the total force, and other free components if need be."""

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from contactopt.analysis.resultants import resultant_words
 from contactopt.cards import count
 from contactopt.errors import InputError
 from contactopt.solving.methods import NATIVE
@@ -110,11 +111,13 @@ def _print_result(result: Any, out: str) -> None:
     print(f"method {s['method']}" + ("" if native else by))
     length, stress = result.scene.units
     force = FORCES.get((length, stress), f"{stress} {length}^2")
-    approach = "none (no plate)" if s["approach"] is None else f"{s['approach']:.6g} {length}"
+    approach = "" if s["approach"] is None else f"approach {s['approach']:.6g} {length}, "
     print(
-        f"normal force {s['normal_force']:.6g} {force}, approach {approach}, "
+        f"sum of normal forces {s['normal_force']:.6g} {force}, {approach}"
         f"largest pressure {s['max_pressure']:.6g} {stress}"
     )
+    for name, words in resultant_words(s).items():
+        print(f"force on the upper body of '{name}': {words} {force}")
     if s["contact_half_width"] is not None:
         print(
             f"contact half-width {s['contact_half_width']:.6g} {length}, "

@@ -35,7 +35,7 @@ from contactopt.analysis.quantities import (
     elastic_energy,
     value_of,
 )
-from contactopt.analysis.resultants import planes_of, views
+from contactopt.analysis.resultants import views
 from contactopt.derivatives.parameters import MATERIAL, Parameter
 from contactopt.derivatives.states import Seeds, Step
 from contactopt.errors import InputError
@@ -233,7 +233,7 @@ def _force(step: Step, kind: str, pair: str | None) -> Seeds:
 def _resultant(step: Step, pair: str, component: str) -> Seeds:
     scene = step.reduction.scene
     axis = np.eye(scene.dim)[scene.components.index(component)]
-    for plane in planes_of(step.reduction):  # mirror images balance each other across it
+    for plane in step.reduction.planes:  # mirror images balance each other across it
         axis = axis - plane.inward * (plane.inward @ axis)
     if scene.kind == "axisymmetric" and component == "r":
         axis = 0 * axis

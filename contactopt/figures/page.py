@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
+from contactopt.analysis.resultants import resultant_words
 from contactopt.errors import InputError
 from contactopt.figures.html import check_installed, packed, packed_short, write_html
 from contactopt.figures.output import STATES
@@ -291,9 +292,11 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
         "contacts": summary["contact_nodes"],
         "friction coefficient": f"{summary['mu']:g}",
         "method": f"{summary['method']}, {summary['outer_iterations']} iterations",
-        "total normal force": f"{summary['normal_force']:.5g} {stress} {length}^2",
+        "sum of the normal forces": f"{summary['normal_force']:.5g} {stress} {length}^2",
         "largest pressure": f"{summary['max_pressure']:.5g} {stress}",
     }
+    for name, force in resultant_words(summary).items():
+        rows[f"force on the upper body of {name}"] = f"{force} {stress} {length}^2"
     rows |= {words: f"{summary[key]:.5g} {length}" for key, words in WORDS.items() if summary.get(key) is not None}
     if found := summary.get("accuracy"):
         error = "unknown" if found["error"] is None else f"{found['error']:.1e}"
@@ -303,6 +306,7 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
         f'<tr><th scope="row">{html.escape(str(name))}</th><td>{html.escape(str(value))}</td></tr>'
         for name, value in rows.items()
     )
+    remarks = "".join(f"<p><strong>{html.escape(text)}</strong></p>" for text in summary.get("remarks", ()))
     turn = "Use the mouse, a finger, the buttons, or the arrow keys and + and - when the picture has the focus."
     what = "move" if data["dim"] == 2 else "turn"
     buttons = "".join(
@@ -314,7 +318,7 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
         )
     )  # fmt: skip
     return f"""<header><h1>{html.escape(summary["scene"])}</h1>
-<p>{html.escape(certificate_words(summary))}</p></header>
+<p>{html.escape(certificate_words(summary))}</p>{remarks}</header>
 <main><div class="columns"><section aria-label="bodies and contact surface">
 <div id="view" class="scene" tabindex="0" role="application" aria-label="picture of the bodies; arrow keys {what} it"></div>
 <p class="note">{turn} {buttons}</p></section>

@@ -18,9 +18,10 @@ import logging
 import time
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import FunctionType
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.sparse as sp
@@ -32,20 +33,24 @@ from contactopt.bodies.solvers import factors_of
 from contactopt.cards import card, count, line
 from contactopt.checks import check_count, check_number
 from contactopt.errors import InputError
+from contactopt.interface.charts import SymmetryPlane
 from contactopt.interface.costs import MOST_EXPLICIT, form_of
 from contactopt.interface.coupling import Coupling, couple
 from contactopt.interface.equilibrium import coupled_form
+from contactopt.interface.halves import mirror_planes
 from contactopt.problem import InterfaceProblem, Law, Pair, Solution
 from contactopt.problem.convolution import Convolution
 from contactopt.problem.laws import make_law
 from contactopt.problem.laws.mixed import join
 from contactopt.problem.operators import (
     FORMS,
+    NOISE,
     Interface,
     InterfaceOperator,
     Product,
     check_dense,
     dense,
+    diagonal,
     estimate_diagonal,
     nodal_weights,
 )
@@ -65,6 +70,8 @@ class Reduction:
     maps       the signed map B (k dim, n) of each body, from its displacements to u
     couplings  contacts, frames, initial gap, areas, chart of each pair of surfaces
     seconds    phase -> time
+    planes     of symmetry beyond which mirror images make the bodies whole
+    on_ground  whether a ground holds thin bodies (contactopt.bodies.thin)
     """
 
     scene: Scene
@@ -73,6 +80,11 @@ class Reduction:
     maps: tuple[sp.csr_matrix, ...]
     couplings: tuple[Coupling, ...]
     seconds: dict[str, float]
+    planes: tuple[SymmetryPlane, ...] = ()
+    on_ground: bool = False
+    _known: WeakKeyDictionary[Solution, tuple[Any, ...]] = field(
+        default_factory=WeakKeyDictionary, init=False, repr=False
+    )
 
     def __repr__(self) -> str:
         unknowns, pairs = (
@@ -142,7 +154,7 @@ class Reduction:
     def displaced(self, solution: Solution) -> tuple[np.ndarray, ...]:
         """Compute the displacements of every body of a solution.
 
-        Bodies whose displacements came with the contact forces are not solved again.
+        They are computed once. Bodies whose displacements came with the contact forces are not solved at all.
 
         Parameters
         ----------
@@ -154,6 +166,8 @@ class Reduction:
         tuple
             U (n_b,) of each body [length].
         """
+        if solution in self._known:
+            return self._known[solution]
         known = [] if solution.displacements is None else list(solution.displacements.parts)
         free = [known.pop(0) if known and body.equilibrium is not None else None for body in self.bodies]
         parts = zip(self.bodies, self.maps, self.own_multipliers(solution.multipliers), free)
@@ -162,7 +176,66 @@ class Reduction:
             body, B, own, X = part
             return body.displacement(B.T @ solution.reactions.ravel(), own, X)
 
-        return each(displaced, parts, [body.parallel for body in self.bodies])
+        self._known[solution] = each(displaced, parts, [body.parallel for body in self.bodies])
+        return self._known[solution]
+
+    def grounded(self) -> Reduction | None:
+        """Put thin bodies on a soft ground (contactopt.bodies.thin).
+
+        Returns
+        -------
+        Reduction or None
+            The reduction with these bodies, whose answer is right where it no longer pulls them; None without thin bodies.
+        """
+        if self.on_ground:
+            return self
+        bodies = _on_ground(self.scene, self.bodies)
+        if all(new is old for new, old in zip(bodies, self.bodies)):
+            return None
+        implicit = isinstance(self.problem.Q, InterfaceOperator)
+        Q = _operator(bodies, self.maps, self.couplings) if implicit else _entries(bodies, self.maps)
+        return replace(self._with(bodies, Q), on_ground=True)
+
+    def pulled(self, solution: Solution) -> Reduction:
+        """Let the ground of each body pull it towards its displacement, from which those of the contacts are taken anew.
+
+        Parameters
+        ----------
+        solution
+            A solution of the problem.
+
+        Returns
+        -------
+        Reduction
+            With other displacements at rest.
+        """
+        displaced = self.displaced(solution)
+        made = self._with(tuple(body.pulled(U) for body, U in zip(self.bodies, displaced)), self.problem.Q)
+        # What rounding in Q and q makes of the displacements of the contacts, beside those of the bodies.
+        missing = self.seen(displaced) - self.problem.displacements(solution.reactions, solution.multipliers)
+        return replace(made, problem=replace(made.problem, q=made.problem.q + missing))
+
+    def seen(self, displaced: Sequence[Any]) -> np.ndarray:
+        """Compute the displacements u of the contacts from those of the bodies.
+
+        Parameters
+        ----------
+        displaced
+            (n_b,) displacement of each body [length].
+
+        Returns
+        -------
+        ndarray
+            (k, dim), with the initial gap [length].
+        """
+        u = sum((body.seen(B, U) for body, B, U in zip(self.bodies, self.maps, displaced)), 0 * self.problem.q.ravel())
+        return np.asarray(u).reshape(self.problem.q.shape) + self.gap[:, None] * np.eye(self.problem.dim)[0]
+
+    def _with(self, bodies: tuple[Body, ...], Q: Interface) -> Reduction:
+        """With bodies that rest elsewhere. What was added to q, the slip of earlier states, stays."""
+        problem = _problem(self.scene, Q, bodies, self.maps, self.couplings)
+        old = _problem(self.scene, Q, self.bodies, self.maps, self.couplings)
+        return replace(self, bodies=bodies, problem=replace(problem, q=self.problem.q + problem.q - old.q))
 
     def loaded(self, scene: Scene) -> Reduction:
         """Put the loads of another scene of the same structure on the same bodies, coupling and Q.
@@ -313,6 +386,7 @@ def reduce_bodies(
     sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
     coupled = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in zip(scene.pairs, sides))
     maps = tuple(_map_of(body, sides, coupled) for body in assembled)
+    planes = mirror_planes(scene, [body.guides() for body in assembled], coupled) if scene.copies > 1 else ()
     seconds["assemble"] = time.perf_counter() - start
 
     start = time.perf_counter()
@@ -334,9 +408,23 @@ def reduce_bodies(
 
     start = time.perf_counter()
     made = _operator(bodies, maps, coupled) if Q == "implicit" else _entries(bodies, maps)
+    on_ground = not np.min(diagonal(made), initial=0.0) >= -NOISE * np.max(diagonal(made), initial=0.0)
+    if on_ground:  # nothing is left of the compliance of a thin body but rounding, or no number
+        bodies = _on_ground(scene, bodies)
+        made = _operator(bodies, maps, coupled) if Q == "implicit" else _entries(bodies, maps)
     problem = _problem(scene, made, bodies, maps, coupled)
     seconds["compliance"] = time.perf_counter() - start
-    return Reduction(scene, problem, bodies, maps, coupled, seconds)
+    return Reduction(scene, problem, bodies, maps, coupled, seconds, planes, on_ground)
+
+
+def _on_ground(scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:
+    """The bodies of a scene, thin ones among them on a soft ground."""
+    modulus = min(part.material.E for part in scene.parts if hasattr(part, "material"))
+    made = each(lambda body: body.grounded(modulus), bodies, [body.parallel for body in bodies])
+    for new, old in zip(made, bodies):
+        if new is not old:
+            log.info("body '%s' is thin: a soft ground holds it until the contact does", new.name)
+    return made
 
 
 def _map_of(

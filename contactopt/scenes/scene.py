@@ -269,6 +269,8 @@ class Scene:
     thickness  depth of a plane-strain body [length].
     copies     how many mirror images make the whole body: 2 for a half model, 4 for a quarter. Forces, nodal
                forces and nodal areas are those of all the images together, as on the ring of an axisymmetric body.
+    mirror     axes across whose planes of symmetry the bodies are halved, as in "x" or "xy"; `copies` is then 2 for each
+               unless it is given. None: where copies > 1, the planes are those on which supports hold the normal alone
     degree     of the displacement in every element: 1, linear, or 2, quadratic; 2 for nearly incompressible bodies,
                where linear elements lock.
     elements   default number of elements across the contact half-width, for parts whose mesh is a function.
@@ -292,6 +294,7 @@ class Scene:
     reference: Any = field(default=None, compare=False)
     bodies: tuple[Part | Rigid | HalfSpace, ...] = ()
     contacts: tuple[Contact, ...] = ()
+    mirror: str | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
@@ -316,6 +319,7 @@ class Scene:
             raise InputError(
                 f"scene '{self.name}': the degree of the displacement must be 1 or 2; got {self.degree!r}."
             )
+        self._check_mirror()
         self._check_pairs()
         for part in self.parts:
             self._check_part(part)
@@ -369,13 +373,33 @@ class Scene:
         tuple
             The names, each once, in the order of the pairs.
         """
-        found = [
-            surface or part.contact
+        return tuple(dict.fromkeys(name for name, _ in self._uses(part))) or (part.contact,)
+
+    def laws_of(self, part: Any, boundary: str) -> set[str]:
+        """Name the contact laws of the pairs that use a boundary.
+
+        Parameters
+        ----------
+        part
+            One of the bodies.
+        boundary
+            The name of one of its boundaries.
+
+        Returns
+        -------
+        set
+            Their names; none for a boundary that no pair uses.
+        """
+        return {pair.law for name, pair in self._uses(part) if name == boundary}
+
+    def _uses(self, part: Any) -> list[tuple[str, Contact]]:
+        """The boundaries of a part that pairs use, each with its pair."""
+        return [
+            (surface or part.contact, pair)
             for pair in self.pairs
             for body, surface in zip(pair.bodies, pair.surfaces)
             if body == part.name
         ]
-        return tuple(dict.fromkeys(found)) or (part.contact,)
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -408,6 +432,24 @@ class Scene:
                 raise InputError(f"scene '{self.name}': bodies and contacts belong together; one of them is empty.")
         elif not all(filled):
             raise InputError(f"scene '{self.name}': give upper, lower and mu, or bodies and contacts.")
+
+    def _check_mirror(self) -> None:
+        """Axes are known, named once, and agree with the number of copies, which they set if it was not given."""
+        if self.mirror is None:
+            return
+        axes = [name for name in self.components if name != "r"]
+        known = isinstance(self.mirror, str) and self.mirror and set(self.mirror) <= set(axes)
+        if not known or len(set(self.mirror)) < len(self.mirror):
+            raise InputError(
+                f"scene '{self.name}': mirror names each axis once, of {', '.join(axes)}; got {short(self.mirror)}."
+            )
+        if self.copies == 1:
+            object.__setattr__(self, "copies", 2 ** len(self.mirror))
+        if self.copies % 2 ** len(self.mirror):
+            raise InputError(
+                f"scene '{self.name}': mirror = {self.mirror!r} makes {2 ** len(self.mirror)} images, but copies is "
+                f"{self.copies}; drop one of them."
+            )
 
     def _check_pairs(self) -> None:
         """Names of bodies are known and not given twice; no pair twice; no body without a pair; no two rigid bodies."""

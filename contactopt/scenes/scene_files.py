@@ -140,6 +140,7 @@ def _scene(path: Path, top: Table, reading: _Reading | None) -> tuple[Scene, dic
         changes[key] = top.take(key, int, "a whole number", usual)
         if not 1 <= changes[key] <= (2 if key == "degree" else 1000):
             raise top.fail(f"{key} must be {'1 or 2' if key == 'degree' else 'at least 1'}; got {changes[key]}.", key)
+    changes["mirror"] = top.text("mirror", "") or None
     solve = _solve(top.table("solve"))
     top.close()
     with top.about():

@@ -104,7 +104,7 @@ class SuperLUSolver:
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
         """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur complement in these places.
 
-        None where SuperLU changed the order for its pivots.
+        None where SuperLU changed the order for its pivots, and where rounding left some that are not positive.
         """
         factors, m = self.factors, len(asked(self.trailing))
         n = factors.shape[0]
@@ -113,6 +113,8 @@ class SuperLUSolver:
         if not symmetric or not np.array_equal(np.sort(factors.perm_c[head:]), np.arange(head, n)):
             return None
         L, pivots = factors.L[head:, head:].toarray(order="F"), factors.U.diagonal()[head:]
+        if pivots.min(initial=1.0) <= 0:
+            return None
         return L * np.sqrt(pivots), factors.perm_c[head:] - head  # L U = L D L' with D > 0 the pivots
 
     def trailing_inverse(self) -> np.ndarray:
