@@ -46,7 +46,7 @@ def unbounded(solved: Solved, quantity: str, stress: StressReading | None, level
         if stress.vertex < 0:
             return ""
         place = ", ".join(f"{x:.4g}" for x in stress.place)
-        if re_entrant(stress.map.body.basis.mesh, stress.vertex):
+        if re_entrant(stress.map.mesh, stress.vertex):
             return f"the largest stress is at the re-entrant corner near ({place}), where it is infinite; no mesh bounds it"
         if _grows(levels):
             return (

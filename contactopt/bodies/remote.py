@@ -19,8 +19,9 @@ import scipy.sparse as sp
 
 from contactopt.bodies.elastic import AssembledElastic, ElasticBody, assemble_elastic
 from contactopt.bodies.fields import Fields
-from contactopt.bodies.protocol import Surface
+from contactopt.bodies.protocol import Region, Surface
 from contactopt.bodies.ranks import Kept, RemotePart, Team, shipped, values_of
+from contactopt.bodies.recovery import StressMap
 from contactopt.errors import InputError
 from contactopt.problem.coupled import LocalTerm
 from contactopt.problem.operators import Product
@@ -42,18 +43,29 @@ def _sent(scene: Scene, part: Part) -> bytes:
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A vector of the unknowns of a body, on its rank, with the operators of an array that the callers of bodies use."""
+    """A vector of the unknowns of a body, on its rank, with the operators of an array that the callers of bodies use.
+
+    body   the Resident whose n unknowns these are; None for vectors of an iteration, which no map of contacts meets
+    known  its values on the contact unknowns (m,) where they are known here
+    """
 
     team: Team
     kept: Kept
+    body: Kept | None = None
+    known: np.ndarray | None = None
     elsewhere = True
+    __array_ufunc__ = None  # NumPy's arrays leave the operators to this class
 
     def _make(self, function: Any, other: Any) -> Field:
+        if isinstance(other, np.ndarray) and self.body is not None:  # forces on the contact unknowns
+            other = Field(self.team, self.team.keep(self.kept.rank, Resident.force, self.body, other))
         own = other.kept if isinstance(other, Field) else other
-        return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, own))
+        return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, own), self.body)
 
-    def __add__(self, other: Field) -> Field:
+    def __add__(self, other: Field | np.ndarray) -> Field:
         return self._make(operator.add, other)
+
+    __radd__ = __add__
 
     def __sub__(self, other: Field) -> Field:
         return self._make(operator.sub, other)
@@ -72,6 +84,21 @@ class Field:
 
     def __matmul__(self, other: Field) -> float:
         return float(self.team.ask(self.kept.rank, operator.matmul, self.kept, other.kept))
+
+    def __rmatmul__(self, T: sp.csr_matrix) -> np.ndarray:
+        """A map (rows, m) of the contact unknowns applied to the vector."""
+        known = self.known
+        if known is None:
+            known = self.team.ask(self.kept.rank, Resident.on_contacts, self.body, self.kept)
+        return np.asarray(T @ known)
+
+    def any(self, axis: None = None, out: None = None) -> bool:
+        """Whether an entry is not zero, as numpy.any asks."""
+        return bool(self.team.ask(self.kept.rank, np.any, self.kept))
+
+    def sum(self, axis: None = None, out: None = None, **more: Any) -> float:
+        """The sum of all entries, as numpy.sum asks."""
+        return float(self.team.ask(self.kept.rank, np.sum, self.kept))
 
     def astype(self, kind: Any) -> Field:
         """The vector in another precision."""
@@ -101,6 +128,22 @@ class Resident:
         full = np.zeros(len(self.body.at_rest))
         full[self.skin] = F
         return full
+
+    def on_contacts(self, U: np.ndarray) -> np.ndarray:
+        """The values (m,) of a vector (n,) on the contact unknowns."""
+        return np.asarray(U[self.skin])
+
+    def act(self, member: str, *arguments: Any) -> Any:
+        """What a member of the body returns; forces on the contact unknowns are widened for it."""
+        given = [self.force(item.values) if isinstance(item, Forces) else item for item in arguments]
+        return getattr(self.body, member)(*given)
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Forces (m,) on the contact unknowns on their way to the rank of the body."""
+
+    values: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -201,18 +244,6 @@ def _moved(own: Resident, T: sp.csr_matrix) -> np.ndarray:
     return own.body.moved(own.wide(T))
 
 
-def _displacement(own: Resident, F: np.ndarray, multipliers: np.ndarray, free: np.ndarray | None) -> np.ndarray:
-    return own.body.displacement(own.force(F), multipliers, free)
-
-
-def _energy(own: Resident, U: np.ndarray) -> float:
-    return own.body.energy(U)
-
-
-def _external_forces(own: Resident, U: np.ndarray) -> np.ndarray:
-    return own.body.external_forces(U)
-
-
 def _held_by(own: Resident, U: np.ndarray, F: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """As ElasticBody.held_by, without the places on which no force acts."""
     found = own.body.held_by(U, own.force(F))
@@ -220,8 +251,21 @@ def _held_by(own: Resident, U: np.ndarray, F: np.ndarray) -> dict[str, tuple[np.
     return {name: (points[:, acting[name]], forces[:, acting[name]]) for name, (points, forces) in found.items()}
 
 
-def _fields(own: Resident, U: np.ndarray) -> Fields:
-    return own.body.fields(U)
+def _load_work(own: Resident, sent: bytes, dual: np.ndarray | Forces, weights: np.ndarray, W: np.ndarray) -> float:
+    scene, part = pickle.loads(sent)
+    return float(own.act("load_work", scene, part, dual, weights, W))
+
+
+def _whole(own: Resident) -> np.ndarray:
+    return own.body.at_rest
+
+
+def _map_facts(found: StressMap) -> tuple[np.ndarray, np.ndarray]:
+    return found.places, found.sources
+
+
+def _mesh(found: StressMap) -> bytes:
+    return shipped(found.mesh)
 
 
 def _loaded(own: Resident, sent: bytes) -> Resident:
@@ -309,9 +353,9 @@ class RemoteBody:
     def unknowns(self) -> int:
         return self.facts.unknowns
 
-    @property
-    def at_rest(self) -> np.ndarray:
-        return self.facts.at_rest
+    @cached_property
+    def at_rest(self) -> Any:
+        return Field(self.team, self._keep(_whole), self.kept, self.facts.at_rest)
 
     @property
     def motions(self) -> np.ndarray:
@@ -350,29 +394,107 @@ class RemoteBody:
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
         return np.asarray(self._ask(_moved, T))
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> Any:
+    def _act(self, member: str, *arguments: Any) -> Any:
+        """What the member of that name returns on the rank of the body."""
+        return self._ask(Resident.act, member, *map(_sendable, arguments))
+
+    def _field(self, member: str, *arguments: Any) -> Field:
+        """The same where it is a vector (n,), which stays there."""
+        return Field(self.team, self._keep(Resident.act, member, *map(_sendable, arguments)), self.kept)
+
+    def displacement(self, force: Any, multipliers: np.ndarray, free: Any = None) -> Any:
         known = None if free is None else free.kept
-        return Field(self.team, self._keep(_displacement, force, multipliers, known))
+        own = self._keep(Resident.act, "displacement", _sendable(force), multipliers, known)
+        return Field(self.team, own, self.kept)
+
+    def material_change(self, constant: str, U: Any, force: np.ndarray) -> tuple[Any, np.ndarray]:
+        made = self._keep(Resident.act, "material_change", constant, _sendable(U), _sendable(force))
+        return self._item(made, 0), self.team.ask(made.rank, operator.getitem, made, 1)
+
+    def material_work(self, constant: str, U: Any, force: np.ndarray, dual: Any, W: Any) -> float:
+        return float(self._act("material_work", constant, U, force, dual, W))
+
+    def load_work(self, scene: Scene, part: Part, dual: Any, weights: np.ndarray, W: Any) -> float:
+        sent = _sent(scene, part)
+        return float(self._ask(_load_work, sent, _sendable(dual), weights, W.kept))
+
+    def energy_gradient(self, U: Any, force: np.ndarray) -> tuple[Any, Any]:
+        made = self._keep(Resident.act, "energy_gradient", _sendable(U), _sendable(force))
+        return self._item(made, 0), self._item(made, 1)
+
+    def _item(self, made: Kept, number: int) -> Field:
+        return Field(self.team, self.team.keep(made.rank, operator.getitem, made, number), self.kept)
+
+    def energy_change(self, constant: str, U: Any, force: np.ndarray) -> float:
+        return float(self._act("energy_change", constant, U, force))
 
     def energy(self, U: Any) -> float:
-        return float(self._ask(_energy, U.kept))
+        return float(self._act("energy", U))
 
     def external_forces(self, U: Any) -> Any:
-        return Field(self.team, self._keep(_external_forces, U.kept))
+        return self._field("external_forces", U)
 
     def held_by(self, U: Any, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         found: dict[str, tuple[np.ndarray, np.ndarray]] = self._ask(_held_by, U.kept, force)
         return found
 
-    def stress_map(self, region: object, by_poisson: bool = False) -> None:
-        return None
+    def recovery_errors(self, U: Any, *others: Any) -> tuple[np.ndarray, ...]:
+        return tuple(self._act("recovery_errors", U, *others))
+
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
+        return np.asarray(self._act("on_elements", values))
+
+    def stress_map(self, region: Region, by_poisson: bool = False) -> RemoteStressMap:
+        made = self._keep(Resident.act, "stress_map", region, by_poisson)
+        return RemoteStressMap(self, made, *self.team.ask(made.rank, _map_facts, made))
 
     def fields(self, U: Any) -> Fields:
-        found: Fields = self._ask(_fields, U.kept)
+        found: Fields = self._act("fields", U)
         return found
 
     def loaded(self, scene: Scene, part: Part) -> RemoteBody:
         return _known(self.team, self._keep(_loaded, _sent(scene, part)))
+
+
+def _sendable(value: Any) -> Any:
+    """An argument as its rank takes it: a vector that is there, forces on the contacts, or what it is."""
+    if isinstance(value, Field):
+        return value.kept
+    return Forces(value) if isinstance(value, np.ndarray) else value
+
+
+@dataclass(frozen=True, eq=False)
+class RemoteStressMap:
+    """A contactopt.bodies.recovery.StressMap on the rank of its body, with its places and sources here."""
+
+    owner: RemoteBody
+    kept: Kept
+    places: np.ndarray
+    sources: np.ndarray
+
+    def _ask(self, function: Any, *arguments: Any) -> Any:
+        return self.owner.team.ask(self.kept.rank, function, self.kept, *arguments)
+
+    @property
+    def mesh(self) -> Any:
+        return pickle.loads(self._ask(_mesh))
+
+    def stress(self, U: Field) -> np.ndarray:
+        return np.asarray(self._ask(StressMap.stress, U.kept))
+
+    def deviation(self, U: Field, slopes: np.ndarray) -> np.ndarray:
+        return np.asarray(self._ask(StressMap.deviation, U.kept, slopes))
+
+    def elements(self, places: np.ndarray) -> np.ndarray:
+        return np.asarray(self._ask(StressMap.elements, places))
+
+    def size(self, number: int) -> float:
+        return float(self._ask(StressMap.size, number))
+
+    def transposed(self, slopes: np.ndarray) -> Field:
+        team = self.owner.team
+        made = team.keep(self.kept.rank, StressMap.transposed, self.kept, slopes)
+        return Field(team, made, self.owner.kept)
 
 
 def _known(team: Team, kept: Kept) -> RemoteBody:
