@@ -10,6 +10,7 @@ import pytest
 
 from contactopt import InputError, Material, Part, Rigid, run, scenes
 from contactopt.cli import main
+from contactopt.files import whole_folder
 from tests.conftest import block, two_blocks
 from tests.test_benchmark_faults import BAD_NAMES, one_line
 
@@ -76,3 +77,22 @@ def test_a_force_beyond_all_numbers_is_one_sentence(tmp_path, capsys):
     assert main(["run", "punch-2d", "--force", "1e308", "--elements", "4", "--out", str(tmp_path / "out")]) == 2
     one_line(capsys.readouterr().err, "1e+100")
     assert not (tmp_path / "out").exists()
+
+
+def test_hidden_folders_of_killed_programs_are_removed_and_those_in_use_are_kept(tmp_path, monkeypatch):
+    """A program is killed in the middle of writing; the next one that writes there tidies up, and nobody else is hurt."""
+    code = (
+        "import os, signal, sys\nfrom pathlib import Path\nfrom contactopt.files import whole_folder\n"
+        "with whole_folder(sys.argv[1]) as folder:\n    (folder / 'half').write_text('x')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path)])
+    (left,) = tmp_path.glob(".contactopt-*")
+    with whole_folder(tmp_path):
+        assert left.exists()  # it may belong to a program that has just begun
+    monkeypatch.setattr("contactopt.files.FRESH", 0.0)
+    with whole_folder(tmp_path) as first, whole_folder(tmp_path) as second:
+        assert not left.exists() and first.exists() and second.exists()
+        (first / "a").write_text("a")
+        (second / "b").write_text("b")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a", "b"]

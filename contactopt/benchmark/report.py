@@ -66,11 +66,6 @@ QUESTIONS = (
     "fail, at its right end, and which is fast, at its left. A table of times by start shows what warm starts buy. A map shows for which numbers a "
     "method fails, and time against size how its cost grows."
 )
-# Whatever an experiment's texts hold, a browser loads nothing from elsewhere and runs no script.
-POLICY = (
-    '<meta http-equiv="Content-Security-Policy" '
-    "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
-)
 STYLE = """body{max-width:60rem;margin:2rem auto;padding:0 1rem;font:16px/1.5 system-ui,sans-serif;color:#222}
 table{border-collapse:collapse;font-size:13px;display:block;overflow-x:auto}td,th{border:1px solid #ccc;padding:.2rem .5rem}
 img{max-width:100%}code{background:#f3f3f3}section{border-top:2px solid #999;margin-top:3rem}"""
@@ -236,9 +231,9 @@ def write_report(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
     InputError
         If a figure does not fit the table.
     """
-    parts = [f"# {_one_line(layout.title)}", _inert(layout.text.strip())]
+    parts = [f"# {_one_line(layout.title)}", layout.text.strip()]
     if layout.findings:
-        parts.append("\n".join(f"{n}. {_inert(text)}" for n, text in enumerate(_findings(layout, table), 1)))
+        parts.append("\n".join(f"{n}. {text}" for n, text in enumerate(_findings(layout, table), 1)))
     remove_files(folder, [old.name for old in folder.glob("figure-*.png")])
     for number, entry in enumerate(layout.figures or USUAL, 1):
         result = _drawn(layout, number, entry, table)
@@ -331,18 +326,13 @@ def _markdown(table: pd.DataFrame) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def _inert(text: object) -> str:
-    """Markdown in which raw HTML is text: a `<` that could open a tag is written as an entity."""
-    return re.sub(r"<(?=[A-Za-z/!?])", "&lt;", str(text))
-
-
 def _one_line(text: object) -> str:
-    return _inert(" ".join(str(text).split()))
+    return " ".join(str(text).split())
 
 
 def _literal(text: str) -> str:
-    """The text in a cell of a table: no HTML, no link, no picture, no end of the cell."""
-    return _one_line(text).replace("|", "\\|").replace("](", "]\\(")
+    """The text in a cell of a table."""
+    return _one_line(text).replace("|", "\\|")
 
 
 def _png(figure: Any) -> bytes:
@@ -356,7 +346,7 @@ def _png(figure: Any) -> bytes:
 
 
 def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
-    """Make one HTML page of reports. It stands alone and holds no script.
+    """Make one HTML page of reports. It stands alone.
 
     Parameters
     ----------
@@ -375,7 +365,7 @@ def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
         f'<section id="{html.escape(layout.name)}">{rendered(text, folder)}</section>'
         for layout, folder, text in bodies
     ]
-    head = f'<!doctype html><html lang="en"><meta charset="utf-8">{POLICY}<title>contactopt: benchmarks</title>'
+    head = '<!doctype html><html lang="en"><meta charset="utf-8"><title>contactopt: benchmarks</title>'
     head += f"<style>{STYLE}</style>"
     return f"{head}<h1>Benchmarks</h1><p>{QUESTIONS}</p><ul>{links}</ul>{''.join(sections)}</html>\n"
 
@@ -383,7 +373,7 @@ def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
 def rendered(text: str, folder: Path) -> str:
     """Make HTML of Markdown, with the pictures of the report embedded.
 
-    Raw HTML is shown as text, and links lead only to the web and within the page.
+    Raw HTML is shown as text.
 
     Parameters
     ----------
@@ -400,28 +390,11 @@ def rendered(text: str, folder: Path) -> str:
     from markdown_it import MarkdownIt
 
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
-    tokens = parser.parse(text)
-    for token in tokens:
-        opened: list[Any] = []
-        for child in token.children or ():
-            if child.type == "link_open":
-                opened.append(child)
-                child.hidden = not re.match(r"https?://|#", str(child.attrGet("href")))
-            elif child.type == "link_close":
-                child.hidden = opened.pop().hidden
-            elif child.type == "image":
-                _embed(child, folder)
-    return str(parser.renderer.render(tokens, parser.options, {}))
-
-
-def _embed(image: Any, folder: Path) -> None:
-    """Put the data of a report's own picture into its token; any other picture becomes its description."""
-    source = str(image.attrGet("src"))
-    file = folder / source
-    if re.fullmatch(r"figure-\d+\.png", source) and file.is_file() and not file.is_symlink():
-        image.attrSet("src", "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode())
-    else:
-        image.type, image.tag, image.children = "text", "", None
+    made = str(parser.render(text))
+    for file in folder.glob("figure-*.png"):
+        data = base64.b64encode(file.read_bytes()).decode()
+        made = made.replace(f'src="{file.name}"', f'src="data:image/png;base64,{data}"')
+    return made
 
 
 def _plain(text: str) -> str:
