@@ -39,9 +39,9 @@ def check_folder(out: Path) -> None:
         If the folder cannot be made or written to.
     """
     existing = out
-    while not existing.exists() and existing != existing.parent:
-        existing = existing.parent
     try:
+        while not existing.exists() and existing != existing.parent:
+            existing = existing.parent
         if not existing.is_dir():
             raise NotADirectoryError(f"{existing} is not a directory")
         with tempfile.TemporaryFile(dir=existing):

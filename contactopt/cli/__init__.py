@@ -46,8 +46,14 @@ def _answered(command: Callable[[], int]) -> int:
     except InputError as error:
         print(f"contactopt: {error}", file=sys.stderr)
         return 2
-    except MemoryError:
-        print("contactopt: this needs more memory than there is; take fewer elements.", file=sys.stderr)
+    except MemoryError as error:
+        why = f" ({error})" if str(error) else ""
+        print(f"contactopt: this needs more memory than there is{why}; take fewer elements.", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        raise
+    except OSError as error:  # a name that no file can have, a disk that is gone
+        print(f"contactopt: cannot use '{error.filename}': {error.strerror or error}.", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("contactopt: interrupted", file=sys.stderr)

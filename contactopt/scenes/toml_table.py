@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from collections.abc import Iterator
@@ -134,8 +135,8 @@ def read_table(path: Path) -> Table:
     InputError
         If there is no such file, if it is too long, or, with the line, if it is not TOML.
     """
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "is no file that can be read" if path.exists() else "does not exist"
+    if not os.path.isfile(path):  # unlike Path.is_file, it answers for names that no file can have
+        what = "is a folder" if os.path.isdir(path) else "is no file that can be read" if os.path.exists(path) else "does not exist"
         raise InputError(f"scene file '{path}' {what}.")
     if path.stat().st_size > MOST_BYTES:
         raise InputError(
