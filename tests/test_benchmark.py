@@ -270,7 +270,7 @@ def test_filters(tmp_path):
         ('["auto", "nsgs"]', '["auto", "sngs"]', 14, "sngs"),
         ('["auto", "nsgs"]', '"auto"\ncolour = 1', 15, "colour"),
         ('["auto", "nsgs"]', '"alternating"\nnormal = "gurobi"', 15, "gurobi"),
-        ("repeats = 2", "repeats = ", 3, "TOML"),
+        ("repeats = 2", "repeats = ", 3, "invalid value"),
     ],
 )
 def test_errors_name_the_line(tmp_path, old, new, line, words):

@@ -20,7 +20,6 @@ import html
 import io
 import os
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import module_from_spec, spec_from_file_location
@@ -34,6 +33,7 @@ from contactopt.benchmark.tables import TABLES, select
 from contactopt.checks import check_name
 from contactopt.errors import InputError
 from contactopt.files import remove_files, replace_file
+from contactopt.scenes.toml_table import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -103,10 +103,7 @@ def read_layout(path: str | Path) -> Layout:
         If the file cannot be read or asks for a figure that does not exist. The message names it.
     """
     path = Path(path)
-    try:
-        data = tomllib.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot read the experiment '{path}': {error}") from error
+    data = read_table(path, "experiment").data
     figures, columns = data.get("figures", []), data.get("columns", [])
     if not isinstance(figures, list) or not all(isinstance(entry, dict) for entry in figures):
         raise InputError(f"'{path}': 'figures' must be a list of tables, [[figures]].")
@@ -373,7 +370,7 @@ def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
 def rendered(text: str, folder: Path) -> str:
     """Make HTML of Markdown, with the pictures of the report embedded.
 
-    Raw HTML is shown as text.
+    Raw HTML is shown as text. Links to files beside the report become text, since the page may stand elsewhere.
 
     Parameters
     ----------
@@ -390,7 +387,7 @@ def rendered(text: str, folder: Path) -> str:
     from markdown_it import MarkdownIt
 
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
-    made = str(parser.render(text))
+    made = re.sub(r'<a href="(?!https?:|#)[^"]*">(.*?)</a>', r"\1", str(parser.render(text)))
     for file in folder.glob("figure-*.png"):
         data = base64.b64encode(file.read_bytes()).decode()
         made = made.replace(f'src="{file.name}"', f'src="data:image/png;base64,{data}"')

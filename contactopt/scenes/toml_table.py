@@ -117,13 +117,15 @@ class Table:
         return " in " + ".".join(names).replace(".[", "[") if names else ""
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path, what: str = "scene file") -> Table:
     """Read the whole of a TOML file.
 
     Parameters
     ----------
     path
         The file.
+    what
+        What it is, in the words of a message.
 
     Returns
     -------
@@ -136,24 +138,22 @@ def read_table(path: Path) -> Table:
         If there is no such file, if it is too long, or, with the line, if it is not TOML.
     """
     if not os.path.isfile(path):  # unlike Path.is_file, it answers for names that no file can have
-        what = "is a folder" if os.path.isdir(path) else "is no file that can be read" if os.path.exists(path) else "does not exist"
-        raise InputError(f"scene file '{path}' {what}.")
+        why = "does not exist" if not os.path.exists(path) else "is no file that can be read"
+        raise InputError(f"{what} '{path}' {'is a folder' if os.path.isdir(path) else why}.")
     if path.stat().st_size > MOST_BYTES:
-        raise InputError(
-            f"scene file '{path}' has more than {MOST_BYTES} bytes; meshes belong into files of their own."
-        )
+        raise InputError(f"{what} '{path}' has more than {MOST_BYTES} bytes; meshes belong into files of their own.")
     try:
         text = path.read_bytes().decode().replace("\r\n", "\n")
         return Table(path.name, lines_of(text) if tomllib.loads(text) else {}, tomllib.loads(text))
     except UnicodeDecodeError as error:
-        raise InputError(f"scene file '{path}' is no text in UTF-8.") from error
+        raise InputError(f"{what} '{path}' is no text in UTF-8.") from error
     except tomllib.TOMLDecodeError as error:
         found = re.search(r" \(at line (\d+), column \d+\)", str(error))
         line = int(found[1]) if found else text.count("\n") + 1
         said = re.sub(r" \(at .*\)", "", str(error))
         raise InputError(f"{path.name}, line {line}: {said[:1].lower()}{said[1:]}.") from error
     except (RecursionError, OSError) as error:
-        raise InputError(f"scene file '{path}' cannot be read: {type(error).__name__}.") from error
+        raise InputError(f"{what} '{path}' cannot be read: {type(error).__name__}.") from error
 
 
 def lines_of(text: str) -> dict[Place, int]:
