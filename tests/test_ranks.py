@@ -14,8 +14,8 @@ import psutil
 import pytest
 
 from contactopt import InputError, reduce, scenes, solve
+from contactopt.bodies.launch import OUTCOME, launch, mpiexec
 from contactopt.bodies.protocol import Body
-from contactopt.bodies.ranks import OUTCOME, launch, mpiexec
 from contactopt.bodies.remote import RemoteBody
 from contactopt.cli import main
 from contactopt.scenes.slices import sliced
@@ -182,7 +182,7 @@ def test_a_mistake_ends_all_ranks_with_its_one_sentence(tmp_path, capfd):
 
 
 def test_one_rank_runs_here_and_starts_no_other(tmp_path, monkeypatch):
-    monkeypatch.setattr("contactopt.bodies.ranks.subprocess", None)
+    monkeypatch.setattr("contactopt.bodies.launch.subprocess", None)
     assert main(["run", "punch-2d", "--elements", "4", "--ranks", "1", "--no-figures", "--out", str(tmp_path)]) == 0
 
 
@@ -191,7 +191,7 @@ def test_one_rank_runs_here_and_starts_no_other(tmp_path, monkeypatch):
     [("punch-2d", "1000", "2 elastic bodies"), ("punch-2d", "3", "2 elastic bodies"), ("punch-2d", "0", "at least 1")],
 )
 def test_ranks_that_would_have_nothing_to_do_are_refused_before_they_start(scene, ranks, sentence, monkeypatch, capfd):
-    monkeypatch.setattr("contactopt.bodies.ranks.subprocess", None)
+    monkeypatch.setattr("contactopt.bodies.launch.subprocess", None)
     assert main(["run", scene, "--ranks", ranks]) == 2
     (line,) = capfd.readouterr().err.strip().splitlines()
     assert sentence in line
@@ -204,14 +204,14 @@ def test_many_ranks_on_a_core_are_refused():
 
 def test_a_rank_starts_no_ranks(monkeypatch):
     monkeypatch.setenv(OUTCOME, "/nowhere")
-    monkeypatch.setattr("contactopt.bodies.ranks.subprocess", None)
+    monkeypatch.setattr("contactopt.bodies.launch.subprocess", None)
     with pytest.raises(InputError, match="do not see each other"):
         launch(2, ["run", "punch-2d"])
 
 
 def test_a_stopped_rank_is_waited_for_with_a_word_and_not_for_ever(tmp_path, monkeypatch, capfd):
-    monkeypatch.setattr("contactopt.bodies.ranks.BEAT", 0.2)
-    monkeypatch.setattr("contactopt.bodies.ranks.PATIENCE", 1.0)
+    monkeypatch.setattr("contactopt.bodies.launch.BEAT", 0.2)
+    monkeypatch.setattr("contactopt.bodies.launch.PATIENCE", 1.0)
     stopped = []
 
     def stop():

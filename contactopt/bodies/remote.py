@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.elastic import AssembledElastic, ElasticBody, assemble_elastic
+from contactopt.bodies import resident
+from contactopt.bodies.elastic import AssembledElastic
 from contactopt.bodies.fields import Fields
 from contactopt.bodies.protocol import Region, Surface
 from contactopt.bodies.ranks import Kept, RemotePart, Team, shipped, values_of
@@ -58,7 +59,7 @@ class Field:
 
     def _make(self, function: Any, other: Any) -> Field:
         if isinstance(other, np.ndarray) and self.body is not None:  # forces on the contact unknowns
-            other = Field(self.team, self.team.keep(self.kept.rank, Resident.force, self.body, other))
+            other = Field(self.team, self.team.keep(self.kept.rank, resident.Resident.force, self.body, other))
         own = other.kept if isinstance(other, Field) else other
         return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, own), self.body)
 
@@ -89,7 +90,7 @@ class Field:
         """A map (rows, m) of the contact unknowns applied to the vector."""
         known = self.known
         if known is None:
-            known = self.team.ask(self.kept.rank, Resident.on_contacts, self.body, self.kept)
+            known = self.team.ask(self.kept.rank, resident.Resident.on_contacts, self.body, self.kept)
         return np.asarray(T @ known)
 
     def any(self, axis: None = None, out: None = None) -> bool:
@@ -107,172 +108,6 @@ class Field:
     def started_dot(self, other: Field) -> Callable[[], float]:
         """The scalar product, when it is called; the work begins now."""
         return self.team.start(self.kept.rank, dot, self.kept, other.kept)
-
-
-# ---- on the rank of the body ----
-
-
-@dataclass(frozen=True)
-class Resident:
-    """An elastic body on its rank, with the unknowns (m,) of its contact surfaces among its own."""
-
-    body: ElasticBody
-    skin: np.ndarray
-
-    def wide(self, T: sp.csr_matrix) -> sp.csr_matrix:
-        """A map (rows, m) of the contact unknowns as one (rows, n) of all unknowns."""
-        return sp.csr_matrix((T.data, self.skin[T.indices], T.indptr), (T.shape[0], len(self.body.at_rest)))
-
-    def force(self, F: np.ndarray) -> np.ndarray:
-        """Forces (m,) on the contact unknowns as nodal forces (n,)."""
-        full = np.zeros(len(self.body.at_rest))
-        full[self.skin] = F
-        return full
-
-    def on_contacts(self, U: np.ndarray) -> np.ndarray:
-        """The values (m,) of a vector (n,) on the contact unknowns."""
-        return np.asarray(U[self.skin])
-
-    def act(self, member: str, *arguments: Any) -> Any:
-        """What a member of the body returns; forces on the contact unknowns are widened for it."""
-        given = [self.force(item.values) if isinstance(item, Forces) else item for item in arguments]
-        return getattr(self.body, member)(*given)
-
-
-@dataclass(frozen=True, eq=False)
-class Forces:
-    """Forces (m,) on the contact unknowns on their way to the rank of the body."""
-
-    values: np.ndarray
-
-
-@dataclass(frozen=True)
-class Facts:
-    """What rank 0 knows of a body, as in contactopt.bodies.protocol.Body, on its contact unknowns."""
-
-    name: str
-    unknowns: int
-    at_rest: np.ndarray
-    motions: np.ndarray
-    motion_names: tuple[str, ...]
-    resultants: np.ndarray
-    iterative: bool
-    complete: bool
-    equilibrated: bool
-
-
-def _skin(assembled: AssembledElastic) -> np.ndarray:
-    return np.sort(assembled.body.contact_dofs, axis=None)
-
-
-def _assembled(sent: bytes, elements: int, zone: float | None) -> AssembledElastic:
-    scene, part = pickle.loads(sent)
-    return assemble_elastic(scene, part, elements, zone)
-
-
-def _surface(assembled: AssembledElastic, name: str | None) -> bytes:
-    """The surface in terms of the contact unknowns alone, and its mesh by the nodes of the contact surfaces alone."""
-    body, skin, whole = assembled.body, _skin(assembled), assembled.surface(name)
-    place = np.full(len(body.load), -1)
-    place[skin] = np.arange(len(skin))
-    traces = tuple(
-        sp.csr_matrix((trace.data, place[trace.indices], trace.indptr), (trace.shape[0], len(skin)))
-        for trace in whole.traces
-    )
-    assert whole.mesh is not None
-    nodes = body.surface_nodes
-    number = np.full(whole.mesh.locations.shape[1], -1)
-    number[nodes] = np.arange(len(nodes))
-    mesh = replace(
-        whole.mesh,
-        faces=number[whole.mesh.faces],
-        locations=whole.mesh.locations[:, nodes],
-        unknowns=place[whole.mesh.unknowns[:, nodes]],
-        held=whole.mesh.held[skin],
-    )
-    return shipped(replace(whole, traces=traces, mesh=mesh))
-
-
-def _sizes(assembled: AssembledElastic) -> tuple[int, int]:
-    return assembled.unknowns, assembled.interface_unknowns
-
-
-def _prepared(assembled: AssembledElastic, solver: str, entries: bool) -> Resident:
-    return Resident(assembled.prepare(solver, entries), _skin(assembled))
-
-
-def _facts(own: Resident) -> Facts:
-    body, skin, equilibrated = own.body, own.skin, own.body.solver.iteration is not None
-    named, solved = (body.name, body.unknowns), (body.iterative, body.complete, equilibrated)
-    return Facts(*named, body.at_rest[skin], body.motions[skin], body.motion_names, body.resultants, *solved)
-
-
-def _term(own: Resident, T: sp.csr_matrix) -> LocalTerm:
-    assert own.body.equilibrium is not None
-    return own.body.equilibrium.term(own.wide(T))
-
-
-def _size(term: LocalTerm) -> tuple[int, tuple[np.ndarray, np.ndarray]]:
-    return term.size, term.low_rank
-
-
-def _trace(term: LocalTerm, X: np.ndarray) -> np.ndarray:
-    return term.started_trace(X)()
-
-
-def _stiffness(term: LocalTerm, X: np.ndarray) -> np.ndarray:
-    return term.stiffness(X)
-
-
-def _cycle(term: LocalTerm, F: np.ndarray) -> np.ndarray:
-    return term.cycle(F)
-
-
-def _product(own: Resident, T: sp.csr_matrix) -> Product:
-    return own.body.product(own.wide(T))
-
-
-def _act(product: Product, X: np.ndarray, accuracy: float | None) -> np.ndarray:
-    return product(X, accuracy)
-
-
-def _compliance(own: Resident, T: sp.csr_matrix) -> np.ndarray:
-    return own.body.compliance(own.wide(T))
-
-
-def _moved(own: Resident, T: sp.csr_matrix) -> np.ndarray:
-    return own.body.moved(own.wide(T))
-
-
-def _held_by(own: Resident, U: np.ndarray, F: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """As ElasticBody.held_by, without the places on which no force acts."""
-    found = own.body.held_by(U, own.force(F))
-    acting = {name: forces.any(axis=0) for name, (_, forces) in found.items()}
-    return {name: (points[:, acting[name]], forces[:, acting[name]]) for name, (points, forces) in found.items()}
-
-
-def _load_work(own: Resident, sent: bytes, dual: np.ndarray | Forces, weights: np.ndarray, W: np.ndarray) -> float:
-    scene, part = pickle.loads(sent)
-    return float(own.act("load_work", scene, part, dual, weights, W))
-
-
-def _whole(own: Resident) -> np.ndarray:
-    return own.body.at_rest
-
-
-def _map_facts(found: StressMap) -> tuple[np.ndarray, np.ndarray]:
-    return found.places, found.sources
-
-
-def _mesh(found: StressMap) -> bytes:
-    return shipped(found.mesh)
-
-
-def _loaded(own: Resident, sent: bytes) -> Resident:
-    return replace(own, body=own.body.loaded(*pickle.loads(sent)))
-
-
-# ---- on rank 0 ----
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,16 +132,16 @@ class RemoteTerm:
         return self._make(LocalTerm.diagonal)
 
     def stiffness(self, X: Field) -> Field:
-        return self._make(_stiffness, X.kept)
+        return self._make(resident.stiffness, X.kept)
 
     def cycle(self, F: Field) -> Field:
-        return self._make(_cycle, F.kept)
+        return self._make(resident.cycle, F.kept)
 
     def pulled(self, r: np.ndarray) -> Field:
         return self._make(LocalTerm.pulled, r[self.rows])
 
     def started_trace(self, X: Field) -> Callable[[], np.ndarray]:
-        own = self.team.start(self.kept.rank, _trace, self.kept, X.kept)
+        own = self.team.start(self.kept.rank, resident.trace, self.kept, X.kept)
 
         def end() -> np.ndarray:
             u = np.zeros(self.length)
@@ -324,8 +159,8 @@ class RemoteEquilibrium:
 
     def term(self, T: sp.csr_matrix) -> RemoteTerm:
         team, rows = self.body.team, np.flatnonzero(np.diff(T.indptr))
-        kept = team.keep(self.body.kept.rank, _term, self.body.kept, T[rows])
-        size, low_rank = team.ask(kept.rank, _size, kept)
+        kept = team.keep(self.body.kept.rank, resident.term, self.body.kept, T[rows])
+        size, low_rank = team.ask(kept.rank, resident.size, kept)
         spread = sp.csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), (T.shape[0], len(rows)))
         return RemoteTerm(team, kept, rows, T.shape[0], size, (spread @ low_rank[0], spread @ low_rank[1]))
 
@@ -336,7 +171,7 @@ class RemoteBody:
 
     team: Team
     kept: Kept
-    facts: Facts
+    facts: resident.Facts
     parallel = True
 
     def _ask(self, function: Any, *arguments: Any) -> Any:
@@ -355,7 +190,7 @@ class RemoteBody:
 
     @cached_property
     def at_rest(self) -> Any:
-        return Field(self.team, self._keep(_whole), self.kept, self.facts.at_rest)
+        return Field(self.team, self._keep(resident.whole), self.kept, self.facts.at_rest)
 
     @property
     def motions(self) -> np.ndarray:
@@ -382,33 +217,33 @@ class RemoteBody:
         return RemoteEquilibrium(self) if self.facts.equilibrated else None
 
     def product(self, T: sp.csr_matrix) -> Product:
-        made = self._keep(_product, T)
-        return lambda X, accuracy: self.team.ask(made.rank, _act, made, X, accuracy)
+        made = self._keep(resident.product, T)
+        return lambda X, accuracy: self.team.ask(made.rank, resident.act, made, X, accuracy)
 
     def convolution(self, T: sp.csr_matrix) -> None:
         return None
 
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
-        return np.asarray(self._ask(_compliance, T))
+        return np.asarray(self._ask(resident.compliance, T))
 
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
-        return np.asarray(self._ask(_moved, T))
+        return np.asarray(self._ask(resident.moved, T))
 
     def _act(self, member: str, *arguments: Any) -> Any:
         """What the member of that name returns on the rank of the body."""
-        return self._ask(Resident.act, member, *map(_sendable, arguments))
+        return self._ask(resident.Resident.act, member, *map(_sendable, arguments))
 
     def _field(self, member: str, *arguments: Any) -> Field:
         """The same where it is a vector (n,), which stays there."""
-        return Field(self.team, self._keep(Resident.act, member, *map(_sendable, arguments)), self.kept)
+        return Field(self.team, self._keep(resident.Resident.act, member, *map(_sendable, arguments)), self.kept)
 
     def displacement(self, force: Any, multipliers: np.ndarray, free: Any = None) -> Any:
         known = None if free is None else free.kept
-        own = self._keep(Resident.act, "displacement", _sendable(force), multipliers, known)
+        own = self._keep(resident.Resident.act, "displacement", _sendable(force), multipliers, known)
         return Field(self.team, own, self.kept)
 
     def material_change(self, constant: str, U: Any, force: np.ndarray) -> tuple[Any, np.ndarray]:
-        made = self._keep(Resident.act, "material_change", constant, _sendable(U), _sendable(force))
+        made = self._keep(resident.Resident.act, "material_change", constant, _sendable(U), _sendable(force))
         return self._item(made, 0), self.team.ask(made.rank, operator.getitem, made, 1)
 
     def material_work(self, constant: str, U: Any, force: np.ndarray, dual: Any, W: Any) -> float:
@@ -416,10 +251,10 @@ class RemoteBody:
 
     def load_work(self, scene: Scene, part: Part, dual: Any, weights: np.ndarray, W: Any) -> float:
         sent = _sent(scene, part)
-        return float(self._ask(_load_work, sent, _sendable(dual), weights, W.kept))
+        return float(self._ask(resident.load_work, sent, _sendable(dual), weights, W.kept))
 
     def energy_gradient(self, U: Any, force: np.ndarray) -> tuple[Any, Any]:
-        made = self._keep(Resident.act, "energy_gradient", _sendable(U), _sendable(force))
+        made = self._keep(resident.Resident.act, "energy_gradient", _sendable(U), _sendable(force))
         return self._item(made, 0), self._item(made, 1)
 
     def _item(self, made: Kept, number: int) -> Field:
@@ -435,7 +270,7 @@ class RemoteBody:
         return self._field("external_forces", U)
 
     def held_by(self, U: Any, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        found: dict[str, tuple[np.ndarray, np.ndarray]] = self._ask(_held_by, U.kept, force)
+        found: dict[str, tuple[np.ndarray, np.ndarray]] = self._ask(resident.held_by, U.kept, force)
         return found
 
     def recovery_errors(self, U: Any, *others: Any) -> tuple[np.ndarray, ...]:
@@ -445,22 +280,22 @@ class RemoteBody:
         return np.asarray(self._act("on_elements", values))
 
     def stress_map(self, region: Region, by_poisson: bool = False) -> RemoteStressMap:
-        made = self._keep(Resident.act, "stress_map", region, by_poisson)
-        return RemoteStressMap(self, made, *self.team.ask(made.rank, _map_facts, made))
+        made = self._keep(resident.Resident.act, "stress_map", region, by_poisson)
+        return RemoteStressMap(self, made, *self.team.ask(made.rank, resident.map_facts, made))
 
     def fields(self, U: Any) -> Fields:
         found: Fields = self._act("fields", U)
         return found
 
     def loaded(self, scene: Scene, part: Part) -> RemoteBody:
-        return _known(self.team, self._keep(_loaded, _sent(scene, part)))
+        return _known(self.team, self._keep(resident.loaded, _sent(scene, part)))
 
 
 def _sendable(value: Any) -> Any:
     """An argument as its rank takes it: a vector that is there, forces on the contacts, or what it is."""
     if isinstance(value, Field):
         return value.kept
-    return Forces(value) if isinstance(value, np.ndarray) else value
+    return resident.Forces(value) if isinstance(value, np.ndarray) else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -477,7 +312,7 @@ class RemoteStressMap:
 
     @property
     def mesh(self) -> Any:
-        return pickle.loads(self._ask(_mesh))
+        return pickle.loads(self._ask(resident.mesh))
 
     def stress(self, U: Field) -> np.ndarray:
         return np.asarray(self._ask(StressMap.stress, U.kept))
@@ -498,7 +333,7 @@ class RemoteStressMap:
 
 
 def _known(team: Team, kept: Kept) -> RemoteBody:
-    return RemoteBody(team, kept, team.ask(kept.rank, _facts, kept))
+    return RemoteBody(team, kept, team.ask(kept.rank, resident.facts, kept))
 
 
 @dataclass(frozen=True, eq=False)
@@ -515,7 +350,7 @@ class AssembledRemote:
 
     @cached_property
     def _sizes(self) -> Sequence[int]:
-        found: tuple[int, int] = self._ask(_sizes)
+        found: tuple[int, int] = self._ask(resident.sizes)
         return found
 
     @property
@@ -530,14 +365,14 @@ class AssembledRemote:
         return bool(self._ask(AssembledElastic.iterates, solver))
 
     def surface(self, name: str | None = None) -> Surface:
-        found: Surface = pickle.loads(self._ask(_surface, name))
+        found: Surface = pickle.loads(self._ask(resident.surface, name))
         return found
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
         raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
 
     def prepare(self, solver: str, entries: bool) -> RemoteBody:
-        return _known(self.team, self.team.keep(self.kept.rank, _prepared, self.kept, solver, entries))
+        return _known(self.team, self.team.keep(self.kept.rank, resident.prepared, self.kept, solver, entries))
 
 
 def assemble_remote(scene: Scene, part: RemotePart, elements: int, zone: float | None) -> AssembledRemote:
@@ -557,5 +392,5 @@ def assemble_remote(scene: Scene, part: RemotePart, elements: int, zone: float |
     """
     team = part.team
     assert team is not None
-    kept = team.keep(part.rank, _assembled, _sent(scene, part), elements, zone)
+    kept = team.keep(part.rank, resident.assembled, _sent(scene, part), elements, zone)
     return AssembledRemote(team, kept, part.name)

@@ -11,7 +11,8 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from contactopt.bodies.ranks import Team, check_bodies, launch, leave, serve, world
+from contactopt.bodies.launch import check_bodies, launch, leave
+from contactopt.bodies.ranks import Team, serve, world
 from contactopt.cli.commands import run, scene_asked
 from contactopt.cli.parser import make_parser
 from contactopt.errors import InputError

@@ -94,7 +94,7 @@ def tensor_mesh(*grids: np.ndarray) -> MeshQuad | MeshHex:
         If the mesh would have more than MOST_CELLS cells or need more memory than is free, and if a cell would be shorter
         than FINEST of its grid.
     """
-    cells = np.prod([float(len(grid) - 1) for grid in grids])
+    cells = float(np.prod([float(len(grid) - 1) for grid in grids]))
     if cells > MOST_CELLS:
         raise InputError(f"a mesh of {cells:.0e} elements is more than {MOST_CELLS:.0e}; take fewer elements.")
     check_memory(f"a mesh of {cells:.2g} elements", NEEDED[len(grids)] * cells)
