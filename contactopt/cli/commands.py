@@ -44,7 +44,18 @@ def _changes(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def scene_asked(options: argparse.Namespace) -> Any:
-    """The scene of the command `run`, of a load path its last state."""
+    """Make the scene of the command `run`.
+
+    Parameters
+    ----------
+    options
+        The options of the command.
+
+    Returns
+    -------
+    Scene
+        The scene; of a load path its last state.
+    """
     from contactopt.runner import scene_of
 
     return scene_of(options.scene, **_changes(options))

@@ -35,7 +35,20 @@ class Table:
         self.known: list[str] = []
 
     def fail(self, message: str, *below: str | int) -> InputError:
-        """The error to raise about this table, or about an entry of it."""
+        """Make the error to raise about this table, or about an entry of it.
+
+        Parameters
+        ----------
+        message
+            One sentence.
+        *below
+            The place of the entry below this table.
+
+        Returns
+        -------
+        InputError
+            The sentence after the name of the file and the line.
+        """
         place: Place = (*self.place, *below)
         while place and place not in self.lines:
             place = place[:-1]
@@ -59,7 +72,24 @@ class Table:
     def take(
         self, key: str, kind: type | tuple[type, ...], what: str, default: Any = None, needed: bool = False
     ) -> Any:
-        """The entry, which must be of that type; `what` names the type in a message."""
+        """Take an entry, which must be of one type.
+
+        Parameters
+        ----------
+        key
+            The name of the entry.
+        kind, what
+            Its type, and how a message names that.
+        default
+            What is returned where there is no entry.
+        needed
+            Whether that is an error instead.
+
+        Returns
+        -------
+        object
+            The value.
+        """
         if not self.has(key):
             if needed:
                 raise self.fail(f"{key!r} is missing{self._here()}; it is {what}.")
@@ -70,10 +100,35 @@ class Table:
         return value
 
     def text(self, key: str, default: str | None = None, needed: bool = False) -> Any:
+        """Take a text.
+
+        Parameters
+        ----------
+        key, default, needed
+            As for `take`.
+
+        Returns
+        -------
+        str or None
+            The text.
+        """
         return self.take(key, str, "a text in quotation marks", default, needed)
 
     def number(self, key: str, default: float | None = None, needed: bool = False, **limits: Any) -> Any:
-        """A finite number within the limits of check_number()."""
+        """Take a finite number.
+
+        Parameters
+        ----------
+        key, default, needed
+            As for `take`.
+        **limits
+            As for contactopt.checks.check_number.
+
+        Returns
+        -------
+        float, int or None
+            The number.
+        """
         value = self.take(key, (int, float), "a number", default, needed)
         if key in self.data:
             with self.about(key):
@@ -91,7 +146,18 @@ class Table:
         return values
 
     def table(self, key: str) -> Table | None:
-        """The table below an entry, None if there is none."""
+        """Take the table below an entry.
+
+        Parameters
+        ----------
+        key
+            The name of the entry.
+
+        Returns
+        -------
+        Table or None
+            None if there is no such entry.
+        """
         data = self.take(key, dict, "a table, { name = value, ... }")
         return None if data is None else Table(self.file, self.lines, data, (*self.place, key))
 
