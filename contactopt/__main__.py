@@ -1,5 +1,6 @@
 """python -m contactopt"""
 
+import atexit
 import os
 import sys
 
@@ -24,6 +25,7 @@ def main() -> int:
         code = 0
     if code == INTERRUPTED:
         # CPython ends itself by SIGINT instead, if the interrupt came within exec() of a text, as dataclasses use it.
+        atexit._run_exitfuncs()  # such as those that free what processes share
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from contextlib import suppress
 from math import isfinite
 from typing import Any
 
@@ -43,6 +45,44 @@ def check_number(name: str, value: float, low: float = -np.inf, high: float = np
         if high < np.inf:
             bounds.append(f"less than {high:g}")
         raise InputError(f"{name} must be a finite number {' and '.join(bounds)}".rstrip() + f"; got {value!r}.")
+
+
+def check_memory(what: str, needed: float) -> None:
+    """Check that something large fits into the memory that is free, before any is taken for it.
+
+    Parameters
+    ----------
+    what
+        What needs the memory, in the words of the message.
+    needed
+        How much it needs at least [bytes].
+
+    Raises
+    ------
+    InputError
+        If less is free, as far as the system tells.
+    """
+    free = _free_memory()
+    if needed > free:
+        raise InputError(
+            f"{what} needs about {needed / 1e9:.2g} GB of memory, more than the {free / 1e9:.2g} GB that are free; take "
+            "fewer elements."
+        )
+
+
+def _free_memory() -> float:
+    """What the system and the limits of this process leave [bytes]; infinite where neither is known."""
+    found = np.inf
+    with suppress(OSError, ValueError, StopIteration):
+        with open("/proc/meminfo") as file:
+            found = 1024.0 * int(next(line for line in file if line.startswith("MemAvailable")).split()[1])
+        with open("/proc/self/statm") as file:
+            mapped = os.sysconf("SC_PAGE_SIZE") * int(file.read().split()[0])
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        found = found if limit == resource.RLIM_INFINITY else min(found, limit - mapped)
+    return found
 
 
 def given(value: Any) -> bool:

@@ -6,14 +6,23 @@ Also pipes to other processes, which may be dead when one writes to them.
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import tempfile
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from contactopt.checks import check_name
 from contactopt.errors import InputError
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+FRESH = 1.0  # s for which nobody takes a folder without a lock for one that was left behind
 
 
 def check_folder(out: Path) -> None:
@@ -30,9 +39,9 @@ def check_folder(out: Path) -> None:
         If the folder cannot be made or written to.
     """
     existing = out
-    while not existing.exists() and existing != existing.parent:
-        existing = existing.parent
     try:
+        while not existing.exists() and existing != existing.parent:
+            existing = existing.parent
         if not existing.is_dir():
             raise NotADirectoryError(f"{existing} is not a directory")
         with tempfile.TemporaryFile(dir=existing):
@@ -69,9 +78,9 @@ def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
     made: list[Path] = []
     try:
         made = _make_folder(out)
-        with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=out) as staging:
-            yield Path(staging)
-            written = sorted(Path(staging).iterdir())
+        with _staging(out) as staging:
+            yield staging
+            written = sorted(staging.iterdir())
             for file in written:
                 os.replace(file, out / file.name)
             remove_files(out, set(stale) - {file.name for file in written})
@@ -120,10 +129,40 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
         their format.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=path.parent) as staging:
-        file = Path(staging) / path.name
-        write(file)
-        os.replace(file, path)
+    with _staging(path.parent) as staging:
+        write(staging / path.name)
+        os.replace(staging / path.name, path)
+
+
+@contextmanager
+def _staging(folder: Path) -> Iterator[Path]:
+    """A hidden folder for files to come, locked while it is in use. Those of programs that were killed are removed."""
+    for old in folder.glob(".contactopt-*"):
+        with suppress(OSError), _locked(old, fresh=FRESH):
+            shutil.rmtree(old)
+    with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=folder) as staging, _locked(Path(staging)):
+        yield Path(staging)
+
+
+@contextmanager
+def _locked(folder: Path, fresh: float = -1.0) -> Iterator[None]:
+    """Lock a folder; OSError if another program has it, or if it is so fresh [s] that its maker may not have locked it yet.
+
+    Without locks of files, as on Windows, nothing is locked, and no folder counts as old.
+    """
+    if fcntl is None:
+        if fresh >= 0:
+            raise OSError("nobody knows whether it is in use")
+        yield
+        return
+    if time.time() - folder.stat().st_mtime < fresh:
+        raise OSError("it was made a moment ago")
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _unwritable(out: Path, error: OSError) -> InputError:

@@ -14,6 +14,7 @@ import numpy as np
 
 from contactopt.analysis.limits import Limits
 from contactopt.analysis.paths import PathResult, solve_states
+from contactopt.analysis.progress import resident_memory
 from contactopt.analysis.quantities import Reading, approach, pressure_reading, stick_width, width
 from contactopt.analysis.resolution import remarks
 from contactopt.analysis.resultants import mirrors, tables
@@ -239,8 +240,20 @@ def run(
     try:
         known = known if team is None and aim is None else None
         return _finish(states, out, files, (method, *backends), options, aim, start, known)
+    except MemoryError as error:
+        raise InputError(_too_large(states[-1], str(error))) from error
     except InputError as error:
         raise error if file is None else file.located(error) from error
+
+
+def _too_large(scene: Scene, why: str) -> str:
+    """The sentence for a run that took all the memory there was."""
+    bodies = count(len(scene.parts), "body", "bodies")
+    held = f"{resident_memory() / 1e9:.2g} GB were taken when more was asked for"
+    return (
+        f"scene '{scene.name}' of {bodies} with elements = {scene.elements} needs more memory than there is: "
+        f"{held}{f' ({why})' if why else ''}; take fewer elements."
+    )
 
 
 def _wanted_files(figures: Sequence[str], html: bool) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import pytest
 
 from contactopt import InputError, Material, Part, Rigid, run, scenes
 from contactopt.cli import main
+from contactopt.files import whole_folder
 from tests.conftest import block, two_blocks
 from tests.test_benchmark_faults import BAD_NAMES, one_line
 
@@ -72,7 +73,63 @@ def test_meshes_that_no_machine_holds_are_one_sentence(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["punch-2d", "--set", "width=1e-300"], "lost in rounding"),
+        (["punch-2d", "--set", "width=1e-5"], "lost in rounding"),
+        (["pin-in-bush", "--force", "1e150"], "too large"),
+        (["pin-in-bush", "--force", "1e-200"], "too small"),
+        (["punch-2d", "--out", "x" * 300], "File name too long"),
+        (["x" * 300 + ".toml"], "does not exist"),
+    ],
+)
+def test_sizes_that_numbers_lose_and_names_that_no_file_has(arguments, words, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", *arguments]) == 2
+    one_line(capsys.readouterr().err, words)
+
+
+@pytest.mark.parametrize("name", ["punch-2d", "punch-3d", "sphere"])
+def test_meshes_beyond_the_memory_that_is_free_are_refused_before_they_are_made(name, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("contactopt.checks._free_memory", lambda: 1e6)
+    monkeypatch.setattr("skfem.MeshQuad.init_tensor", None)
+    monkeypatch.setattr("skfem.MeshHex.init_tensor", None)
+    assert main(["run", name, "--elements", "16", "--out", str(tmp_path / "out")]) == 2
+    one_line(capsys.readouterr().err, "GB of memory, more than the 0.001 GB that are free")
+
+
+@pytest.mark.parametrize("place", ["solve_states", "recover"])
+def test_the_end_of_memory_in_a_run_is_one_sentence_with_a_size(place, tmp_path, capsys, monkeypatch):
+    def full(*given, **more):
+        raise MemoryError
+
+    monkeypatch.setattr(f"contactopt.runner.{place}", full)
+    assert main(["run", "punch-2d", "--elements", "4", "-q", "--out", str(tmp_path / "out")]) == 2
+    one_line(capsys.readouterr().err, "GB were taken when more was asked for")
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_force_beyond_all_numbers_is_one_sentence(tmp_path, capsys):
     assert main(["run", "punch-2d", "--force", "1e308", "--elements", "4", "--out", str(tmp_path / "out")]) == 2
     one_line(capsys.readouterr().err, "1e+100")
     assert not (tmp_path / "out").exists()
+
+
+def test_hidden_folders_of_killed_programs_are_removed_and_those_in_use_are_kept(tmp_path, monkeypatch):
+    """A program is killed in the middle of writing; the next one that writes there tidies up, and nobody else is hurt."""
+    code = (
+        "import os, signal, sys\nfrom pathlib import Path\nfrom contactopt.files import whole_folder\n"
+        "with whole_folder(sys.argv[1]) as folder:\n    (folder / 'half').write_text('x')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path)])
+    (left,) = tmp_path.glob(".contactopt-*")
+    with whole_folder(tmp_path):
+        assert left.exists()  # it may belong to a program that has just begun
+    monkeypatch.setattr("contactopt.files.FRESH", 0.0)
+    with whole_folder(tmp_path) as first, whole_folder(tmp_path) as second:
+        assert not left.exists() and first.exists() and second.exists()
+        (first / "a").write_text("a")
+        (second / "b").write_text("b")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a", "b"]

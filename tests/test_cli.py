@@ -92,7 +92,7 @@ def test_show_reads_a_scene_file(tmp_path, capsys):
 def test_bash_completes_commands_options_and_scenes():
     def complete(*words):
         line = " ".join(f"'{word}'" for word in ("contactopt", *words))
-        code = f"{script(cli.make_parser(), 'bash')}\nCOMP_WORDS=({line}); COMP_CWORD={len(words)}; _contactopt"
+        code = f"{script(cli.make_parser(), 'bash')}\nCOMP_WORDS=({line}); COMP_CWORD={len(words)}; _shtab_contactopt x '{words[-1]}'"
         done = subprocess.run(
             ["bash", "-c", code + '; echo "${COMPREPLY[@]}"'], capture_output=True, text=True, check=True
         )

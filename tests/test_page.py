@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+import shutil
 import sys
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ import pytest
 from browser import CHROMIUM, Browser
 
 from contactopt import InputError, cli, run, scenes
-from contactopt.figures.page import certificate_words
+from contactopt.figures.page import certificate_words, write_page
 from contactopt.interface.recovery import recover
 
 
@@ -144,6 +145,48 @@ def test_view_makes_the_page_of_an_earlier_run(tmp_path, capsys, monkeypatch):
     assert data_of(page) == data_of(tmp_path / "view.html") and len(opened) == 2
     assert cli.main(["view", str(tmp_path / "nothing")]) == 2
     assert "is not the folder of a finished run" in capsys.readouterr().err
+
+
+def damaged(data: bytes, way: str, rng: np.random.Generator) -> bytes:
+    """A file cut short, with bytes flipped, emptied, or with a JSON value of another type."""
+    if way == "cut":
+        return data[: int(rng.integers(len(data)))]
+    if way == "flipped":
+        changed = bytearray(data)
+        for place in rng.integers(len(data), size=20):
+            changed[place] ^= int(rng.integers(1, 256))
+        return bytes(changed)
+    if way == "empty":
+        return b""
+    summary = json.loads(data)
+    values = [None, "x", -1, 1e400, [], {}, [[]], {"x": 1}, True]
+    summary[str(rng.choice(sorted(summary)))] = values[int(rng.integers(len(values)))]
+    return json.dumps(summary).encode()
+
+
+@pytest.mark.filterwarnings("error")
+def test_damaged_results_become_a_page_or_one_sentence(folder, tmp_path, monkeypatch, capfd):
+    """Files cut, flipped, swapped, missing, and values of other types, in all three runs."""
+    monkeypatch.setattr("contactopt.figures.page.write_html", lambda *given: None)
+    rng, refused, ways = np.random.default_rng(2), 0, ("cut", "flipped", "empty", "swapped", "missing", "type")
+    for number in range(90):
+        run_folder = folder / ("flat", "solid", "path")[number % 3]
+        work = tmp_path / str(number)
+        shutil.copytree(run_folder, work, ignore=shutil.ignore_patterns("*.html"))
+        files, way = sorted(work.iterdir()), ways[number // 3 % len(ways)]
+        file = work / "summary.json" if way == "type" else files[int(rng.integers(len(files)))]
+        if way == "swapped":
+            file.write_bytes(files[int(rng.integers(len(files)))].read_bytes())
+        elif way == "missing":
+            file.unlink()
+        else:
+            file.write_bytes(damaged(file.read_bytes(), way, rng))
+        try:
+            write_page(work, tmp_path / "page.html")
+        except InputError as error:
+            refused += 1
+            assert "is not the folder of a finished run" in str(error) and "\n" not in str(error)
+    assert refused > 30 and capfd.readouterr() == ("", "")
 
 
 def test_without_plotly_a_sentence_says_what_to_install(tmp_path, monkeypatch):

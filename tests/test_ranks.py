@@ -4,20 +4,24 @@ import json
 import os
 import subprocess
 import sys
+import threading
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from contactopt import InputError, reduce, scenes, solve
-from contactopt.bodies.ranks import mpiexec
+from contactopt.bodies.launch import OUTCOME, launch, mpiexec
+from contactopt.bodies.protocol import Body
+from contactopt.bodies.remote import RemoteBody
 from contactopt.cli import main
 from contactopt.scenes.slices import sliced
 from contactopt.solving.preconditioners import degrees
 
-pytest.importorskip("mpi4py")
 ROOT = Path(__file__).parents[1]
 PATIENCE = 300  # seconds; a test that needs them hangs
 
@@ -79,6 +83,19 @@ try:
         problem.Q @ np.ones(len(problem.Q.diagonal))
         sent = (team.traffic.messages - before[0], team.traffic.length - before[1])
         found["traffic"].append((*sent, sum(body.unknowns for body in contactopt.reduce_bodies(scene).bodies)))
+    for quantity in ("energy", "pressure", "von_mises:foundation"):
+        aim = dict(elements=4, accuracy=0.2, quantity=quantity, adaptive=True)
+        one, many = (contactopt.run("punch-2d", team=own, **aim).estimate for own in (None, team))
+        found[f"adaptive {quantity}"] = [[level.value for level in made.levels] for made in (one, many)]
+        found[f"errors {quantity}"] = one.error, many.error
+    for scene, upper in (("punch-2d", "punch"), ("cattaneo-2d", "upper")):
+        names = ("E", f"nu:{upper}", f"force:{upper}:y", "mu")
+        pair = [contactopt.run(scene, elements=4, team=own) for own in (None, team)]
+        for quantity in ("energy", "approach"):
+            made = [contactopt.gradient(own, quantity, names) for own in pair]
+            found[f"gradient {scene} {quantity}"] = [
+                [*own.by.values(), own.onesided({name: 1.0 for name in names})] for own in made
+            ]
     bad = flat(lower=replace(flat().lower, mesh=torn))
     try:
         contactopt.run(bad, team=team)
@@ -121,6 +138,25 @@ def test_energies_of_a_load_path_are_those_of_one_process(found):
     assert found["load path"]["work"] < 1e-12
 
 
+@pytest.mark.parametrize("quantity", ["energy", "pressure", "von_mises:foundation"])
+def test_adaptive_refinement_is_that_of_one_process(found, quantity):
+    one, many = found[f"adaptive {quantity}"]
+    assert one == many and len(one) > 1
+    assert found[f"errors {quantity}"][0] == pytest.approx(found[f"errors {quantity}"][1], rel=1e-12)
+
+
+@pytest.mark.parametrize("scene", ["punch-2d", "cattaneo-2d"])
+@pytest.mark.parametrize("quantity", ["energy", "approach"])
+def test_gradients_are_those_of_one_process(found, scene, quantity):
+    one, many = map(np.array, found[f"gradient {scene} {quantity}"])
+    assert np.abs(one - many).max() <= 1e-10 * np.abs(one).max() and np.any(one)
+
+
+def test_a_body_elsewhere_has_every_member_of_a_body():
+    members = {name for name in vars(Body) if not name.startswith("_")}
+    assert not [name for name in sorted(members) if not hasattr(RemoteBody, name)]
+
+
 def test_messages_do_not_grow_with_the_unknowns_of_the_bodies(found):
     """One product with Q is one order to the other body and its reply, whatever lies inside of the body."""
     (messages, data, unknowns), (others, more, larger) = found["traffic"]
@@ -146,8 +182,60 @@ def test_a_mistake_ends_all_ranks_with_its_one_sentence(tmp_path, capfd):
     assert first == second and first.startswith("contactopt: ")
 
 
+def test_one_rank_runs_here_and_starts_no_other(tmp_path, monkeypatch):
+    monkeypatch.setattr("contactopt.bodies.launch.subprocess", None)
+    assert main(["run", "punch-2d", "--elements", "4", "--ranks", "1", "--no-figures", "--out", str(tmp_path)]) == 0
+
+
+@pytest.mark.parametrize(
+    ("scene", "ranks", "sentence"),
+    [("punch-2d", "1000", "2 elastic bodies"), ("punch-2d", "3", "2 elastic bodies"), ("punch-2d", "0", "at least 1")],
+)
+def test_ranks_that_would_have_nothing_to_do_are_refused_before_they_start(scene, ranks, sentence, monkeypatch, capfd):
+    monkeypatch.setattr("contactopt.bodies.launch.subprocess", None)
+    assert main(["run", scene, "--ranks", ranks]) == 2
+    (line,) = capfd.readouterr().err.strip().splitlines()
+    assert sentence in line
+
+
+def test_many_ranks_on_a_core_are_refused():
+    with pytest.raises(InputError, match="ranks are too many for"):
+        mpiexec(100_000)
+
+
+def test_a_rank_starts_no_ranks(monkeypatch):
+    monkeypatch.setenv(OUTCOME, "/nowhere")
+    monkeypatch.setattr("contactopt.bodies.launch.subprocess", None)
+    with pytest.raises(InputError, match="do not see each other"):
+        launch(2, ["run", "punch-2d"])
+
+
+def test_a_stopped_rank_is_waited_for_with_a_word_and_not_for_ever(tmp_path, monkeypatch, capfd):
+    monkeypatch.setattr("contactopt.bodies.launch.BEAT", 0.2)
+    monkeypatch.setattr("contactopt.bodies.launch.PATIENCE", 1.0)
+    stopped = []
+
+    def stop():
+        begin = time.monotonic()
+        while not stopped and time.monotonic() - begin < PATIENCE:
+            time.sleep(0.05)
+            for process in psutil.Process().children(recursive=True):
+                with suppress(psutil.Error):
+                    if process.environ().get("OMPI_COMM_WORLD_RANK") == "1" and "python" in process.name():
+                        process.suspend()
+                        stopped.append(process.pid)
+
+    thread = threading.Thread(target=stop)
+    thread.start()
+    begin = time.monotonic()
+    code = main(["run", "punch-2d", "--elements", "4", "--ranks", "2", "--out", str(tmp_path / "out")])
+    thread.join()
+    errors = capfd.readouterr().err
+    assert code != 0 and time.monotonic() - begin < 30 and not psutil.pid_exists(stopped[0])
+    assert f"kill -CONT {stopped[0]}" in errors and "nothing was written" in errors
+
+
 def test_the_death_of_a_rank_ends_all(tmp_path):
-    psutil = pytest.importorskip("psutil")
     command = [sys.executable, "-m", "contactopt", "run", "punch-3d", "--elements", "14", "--ranks", "2"]
     started = subprocess.Popen(
         [*command, "--out", str(tmp_path / "out")], stderr=subprocess.PIPE, text=True, env=environment(), cwd=ROOT

@@ -33,7 +33,7 @@ def pin_in_hole(force_per_length: float, radius: float, clearance: float, modulu
 
     Raises
     ------
-    InputError : if an argument is not positive
+    InputError : if an argument is not positive, and for forces beyond those that numbers can resolve
 
     Notes
     -----
@@ -52,7 +52,11 @@ def pin_in_hole(force_per_length: float, radius: float, clearance: float, modulu
 
     # with no clearance at all contact ends at the root of 2 = ln(1 + b^2) + 2 b^4
     full = brentq(lambda b: np.log1p(b**2) + 2 * b**4 - 2, 0.5, 1.0, xtol=1e-15)
-    b = float(np.exp(brentq(excess, np.log(1e-8), np.log(full), xtol=1e-15)))
+    ends = np.log(1e-8), np.log(full)
+    if not excess(ends[0]) > 0 > excess(ends[1]):
+        much = "large" if excess(ends[0]) > 0 else "small"
+        raise InputError(f"the force {force_per_length:g} per length is too {much} for this pin; take another force.")
+    b = float(np.exp(brentq(excess, *ends, xtol=1e-15)))
 
     def pressure(x: np.ndarray) -> np.ndarray:
         angle = np.abs(np.asarray(x, dtype=float)) / radius

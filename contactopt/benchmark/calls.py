@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import inspect
 import random
 import time
@@ -10,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.benchmark.measure import Task
+from contactopt.benchmark.measure import Answer, Task
 from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.process import one_line
 from contactopt.benchmark.runs import PASSED
+from contactopt.benchmark.store import STATUSES
 from contactopt.errors import BackendError, InputError
 from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.solving.driver import solve
@@ -37,28 +39,12 @@ class Outcome:
     history: tuple[dict[str, float], ...] = ()
 
 
-def no_answer(status: str, error: object, measured: dict[str, float] | None = None) -> dict[str, Any]:
-    """Write the message of a run that ended without an answer, in the form of contactopt.benchmark.measure.Answer.
-
-    Parameters
-    ----------
-    status
-        How it ended, a word of the column `status`.
-    error
-        What was said, a text or an exception.
-    measured
-        Times and memory, as far as they are known.
-
-    Returns
-    -------
-    dict
-        The fields of Answer.
-    """
-    blank = {"reactions": None, "multipliers": None, "label": "", "iterations": np.nan, "seconds": np.nan}
-    return {"status": status, "message": one_line(error), "measured": measured or {}, "history": None, **blank}
+def no_answer(status: str, error: object, measured: dict[str, float] | None = None) -> Answer:
+    """What is said of a run that ended without an answer: a word of the column `status`, and a text or an exception."""
+    return Answer(status, one_line(error), measured or {})
 
 
-def measure(task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry) -> dict[str, Any]:
+def measure(task: Task, problem: InterfaceProblem, start: Solution | None, plugins: Registry) -> Answer:
     """Run a method on a problem, and measure time and memory.
 
     Parameters
@@ -74,8 +60,8 @@ def measure(task: Task, problem: InterfaceProblem, start: Solution | None, plugi
 
     Returns
     -------
-    dict
-        Its answer, or how it failed, in the form of contactopt.benchmark.measure.Answer.
+    Answer
+        Its answer, or how it failed.
     """
     random.seed(task.seed)
     np.random.seed(task.seed)  # noqa: NPY002 (a plug-in may use the global generator)
@@ -83,40 +69,42 @@ def measure(task: Task, problem: InterfaceProblem, start: Solution | None, plugi
     wall, cpu = time.perf_counter(), time.process_time()
     try:
         outcome: Outcome | Exception = call(task, problem, start, plugins)
-    except (Exception, SystemExit) as error:
-        outcome = error if isinstance(error, Exception) else RuntimeError(f"it called exit({error})")
+    except (Exception, SystemExit, KeyboardInterrupt) as error:
+        outcome = error if isinstance(error, Exception) else RuntimeError(f"it raised {type(error).__name__}({error})")
     measured |= {"call_seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}
     measured["peak_mb"] = _peak()
     if not isinstance(outcome, Outcome):
         kinds = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "backend_failed"}
-        return no_answer(
-            next((word for kind, word in kinds.items() if isinstance(outcome, kind)), "error"), outcome, measured
-        )
+        word = next((word for kind, word in kinds.items() if isinstance(outcome, kind)), "error")
+        full = isinstance(outcome, OSError) and outcome.errno == errno.ENOMEM
+        return no_answer("out_of_memory" if full else word, outcome, measured)
     try:
         return _read_outcome(outcome, problem, measured)
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
         return no_answer("error", f"its answer has the wrong form: {error}", measured)
 
 
-def _read_outcome(outcome: Outcome, problem: InterfaceProblem, measured: dict[str, float]) -> dict[str, Any]:
-    """The message of an answer; TypeError or ValueError if it has the wrong form."""
+def _read_outcome(outcome: Outcome, problem: InterfaceProblem, measured: dict[str, float]) -> Answer:
+    """The answer in its one form; TypeError or ValueError if it has another."""
     r, lam = _real(outcome.reactions), None if outcome.multipliers is None else _real(outcome.multipliers)
     if r.size != problem.q.size:
         raise ValueError(f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}")
     if lam is not None and lam.shape != problem.s.shape:
         raise ValueError(f"multipliers must have shape {problem.s.shape}; got {lam.shape}")
+    if outcome.status not in STATUSES:
+        raise ValueError(f"{outcome.status!r} is no status")
     seconds = measured["call_seconds"] if np.isnan(outcome.seconds) else float(outcome.seconds)
-    return {
-        "status": outcome.status,
-        "message": one_line(outcome.message),
-        "measured": measured,
-        "reactions": r.reshape(problem.q.shape),
-        "multipliers": lam,
-        "label": outcome.label,
-        "iterations": float(outcome.iterations),
-        "seconds": seconds,
-        "history": _thinned(outcome.history),
-    }
+    return Answer(
+        outcome.status,
+        one_line(outcome.message),
+        measured,
+        r.reshape(problem.q.shape),
+        lam,
+        str(outcome.label),
+        float(outcome.iterations),
+        seconds,
+        _thinned(outcome.history),
+    )
 
 
 def _real(values: Any) -> np.ndarray:

@@ -13,6 +13,7 @@ from contactopt.benchmark.experiment import Experiment, NothingToRun, read_exper
 from contactopt.benchmark.files import subfolder, told
 from contactopt.benchmark.measure import Task
 from contactopt.benchmark.pool import run_locally, run_on_cluster
+from contactopt.benchmark.process import end_orphans
 from contactopt.benchmark.report import build, publish, read_layout
 from contactopt.benchmark.store import Store, load, require, save
 from contactopt.checks import check_count
@@ -63,7 +64,8 @@ def run_campaign(
         On an experiment that cannot be run, filters that no run matches, results in the folder without `resume`, and a
         folder that cannot be written to.
     """
-    require("pandas", "pyarrow", "tqdm")
+    require("loky", "pandas", "psutil", "pyarrow", "tqdm")
+    end_orphans()
     if not isinstance(experiment, Experiment):
         experiment = read_experiment(experiment)
     if jobs is not None:

@@ -1,7 +1,4 @@
-"""What plug-ins declare: names, laws and arguments. Read in a process of its own, so that no plug-in runs in the campaign's.
-
-The campaign's process certifies the answers. A plug-in that changes the library where it is loaded changes nothing there.
-"""
+"""What plug-ins declare: names, laws and arguments. Read in a process of its own, where they may fail or hang."""
 
 from __future__ import annotations
 
@@ -10,16 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from contactopt.benchmark.plugins import LAWS, Registry
-from contactopt.benchmark.process import START, Ended, Process
+from contactopt.benchmark.plugins import Registry
+from contactopt.benchmark.process import Ended, Process
 from contactopt.errors import InputError
 from contactopt.solving.methods import METHODS
 
 LIMIT = 120.0  # s to load all plug-ins
-LONGEST = 10e6  # bytes of a catalogue
-P = inspect.Parameter
-KINDS = (P.POSITIONAL_ONLY, P.POSITIONAL_OR_KEYWORD, P.VAR_POSITIONAL, P.KEYWORD_ONLY, P.VAR_KEYWORD)
-Arguments = tuple[tuple[str, int, bool], ...]  # (name, index in KINDS, whether it has a default)
 
 
 @dataclass(frozen=True)
@@ -28,11 +21,7 @@ class Declared:
 
     law: str
     iterates: bool
-    arguments: Arguments
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(name for name, _, _ in self.arguments)
+    arguments: inspect.Signature
 
 
 @dataclass(frozen=True)
@@ -40,7 +29,7 @@ class Catalogue:
     """methods and problems that plug-ins declare, by name."""
 
     methods: Mapping[str, Declared] = field(default_factory=dict)
-    problems: Mapping[str, Arguments] = field(default_factory=dict)
+    problems: Mapping[str, inspect.Signature] = field(default_factory=dict)
 
 
 def read_catalogue(paths: Sequence[str], names: Sequence[str]) -> Catalogue:
@@ -66,91 +55,36 @@ def read_catalogue(paths: Sequence[str], names: Sequence[str]) -> Catalogue:
     asked = [name for name in dict.fromkeys(names) if name not in METHODS]
     if not paths and not asked:
         return Catalogue()
-    process = Process("inspect")
+    from contactopt.benchmark.worker import inspect as look
+
+    process = Process()
     try:
-        found = process.ask((tuple(paths), asked), {START: LIMIT}, LONGEST)
+        found: Catalogue | str = process.ask(LIMIT, "load", look, tuple(paths), asked)
     except Ended as end:
         where = ", ".join(f"'{path}'" for path in paths) or "entry points"
         raise InputError(f"plug-ins ({where}) could not be loaded: {end.status}, {end.message}.") from end
     finally:
-        process.close()
-    if isinstance(found, dict) and "error" in found:
-        raise InputError(str(found["error"]))
-    try:
-        methods = {
-            str(name): Declared(LAWS[LAWS.index(law)], bool(iterates), _checked(arguments))
-            for name, (law, iterates, arguments) in found["methods"].items()
-        }
-        return Catalogue(methods, {str(name): _checked(arguments) for name, arguments in found["problems"].items()})
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
-        raise InputError("plug-ins declared something that cannot be read.") from error
+        process.kill()
+    if isinstance(found, str):
+        raise InputError(found)
+    return found
 
 
-def _checked(arguments: Any) -> Arguments:
-    return tuple((str(name), KINDS.index(KINDS[kind]), bool(default)) for name, kind, default in arguments)
+def declared(plugins: Registry, names: Sequence[str]) -> Catalogue:
+    """List what loaded plug-ins declare, and the entry points of these names."""
+    for name in names:
+        plugins.find(name)
+    return Catalogue(
+        {p.name: Declared(p.law, p.iterates, arguments_of(p.make)) for p in plugins.methods.values()},
+        {name: arguments_of(make) for name, make in plugins.problems.items()},
+    )
 
 
-def bind(arguments: Arguments, *values: Any, **given: Any) -> None:
-    """Check that values fit the arguments of a plug-in.
-
-    Parameters
-    ----------
-    arguments
-        What the plug-in declared.
-    values, given
-        Arguments by their place and by their name.
-
-    Raises
-    ------
-    TypeError
-        If they do not, as from the call itself.
-    """
-    parameters = [P(name, KINDS[kind], default=None if default else P.empty) for name, kind, default in arguments]
-    inspect.Signature(parameters).bind(*values, **given)
-
-
-def arguments_of(function: Callable[..., Any]) -> Arguments:
-    """List the arguments of a function as plain data.
-
-    Parameters
-    ----------
-    function
-        Any function or class.
-
-    Returns
-    -------
-    tuple
-        For each argument its name, the number of its kind in KINDS, and whether it has a default.
-    """
-    parameters = inspect.signature(function).parameters.values()
-    return tuple((p.name, KINDS.index(p.kind), p.default is not P.empty) for p in parameters)
-
-
-def declare(paths: Sequence[str], names: Sequence[str]) -> dict[str, Any]:
-    """Load plug-ins and list what they declare. It runs in the process of its own.
-
-    Parameters
-    ----------
-    paths
-        The plug-in files.
-    names
-        The methods to look for among the entry points.
-
-    Returns
-    -------
-    dict
-        'methods' and 'problems' as plain data, or 'error' with a sentence if a plug-in fails.
-    """
-    try:
-        plugins = Registry()
-        plugins.load(paths)
-        for name in names:
-            plugins.find(name)
-        return {
-            "methods": {p.name: (p.law, p.iterates, arguments_of(p.make)) for p in plugins.methods.values()},
-            "problems": {name: arguments_of(make) for name, make in plugins.problems.items()},
-        }
-    except InputError as error:
-        return {"error": str(error)}
-    except (Exception, SystemExit) as error:
-        return {"error": f"a plug-in cannot be used: {type(error).__name__}: {error}"}
+def arguments_of(function: Callable[..., Any]) -> inspect.Signature:
+    """The arguments of a function or class, each with None for its default value and without types."""
+    empty = inspect.Parameter.empty
+    parameters = [
+        own.replace(annotation=empty, default=empty if own.default is empty else None)
+        for own in inspect.signature(function).parameters.values()
+    ]
+    return inspect.Signature(parameters)

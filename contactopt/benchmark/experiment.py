@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -20,6 +19,7 @@ from contactopt.benchmark.problems import FAMILIES, KINDS, ProblemSpec, named
 from contactopt.benchmark.runs import SETTINGS, STARTS, MethodSpec, Run
 from contactopt.checks import check_name, check_number, short
 from contactopt.errors import InputError
+from contactopt.scenes.toml_table import Table, read_table
 
 MOST_RUNS = 200_000  # of one experiment
 BOUNDS = {"time_limit": (0.0, 1e6), "memory_limit": (0.2, 1e4)}  # s; GB: less than the least holds no NumPy and SciPy
@@ -116,24 +116,21 @@ def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
         On anything that cannot be run. The message names file and line.
     """
     path = Path(path)
-    try:
-        text = path.read_text()
-        data = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read the experiment '{path}': {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"'{path}' is not valid TOML: {error}") from error
-    reader = _Reader(path, text, "quick" if quick else "")
-    if quick:
-        data |= data.get("quick", {})
-    return reader.experiment(data)
+    root = read_table(path, "experiment")
+    own = root.data.get("quick", {}) if quick else {}
+    if not isinstance(own, dict):
+        raise root.fail("'quick' must be a table.", "quick")
+    return _Reader(path, root, own).experiment(root.data | own)
 
 
 class _Reader:
-    """Checks one file's keys; every complaint goes through `located`, which finds the line."""
+    """Checks one file's keys; every complaint goes through `located`, which finds the line.
 
-    def __init__(self, path: Path, text: str, prefix: str):
-        self.path, self.lines, self.prefix = path, text.splitlines(), prefix
+    quick  the keys of the quick version that is read
+    """
+
+    def __init__(self, path: Path, root: Table, quick: Mapping[str, Any]):
+        self.path, self.root, self.quick = path, root, quick
 
     def experiment(self, data: dict[str, Any]) -> Experiment:
         known = {f.name: f for f in fields(Experiment)}
@@ -297,22 +294,10 @@ class _Reader:
         except InputError as error:
             raise self.located(str(error), key) from error
 
-    def located(self, message: str, table: str, index: int = 0, key: str = "") -> InputError:
-        """The error with its line: that of `key` in the index-th [[table]], or of the table, or of the top-level key."""
-        prefix = f"{self.prefix}." if any(f"[[{self.prefix}.{table}]]" in line for line in self.lines) else ""
-        head = re.compile(rf"\s*(\[\[{re.escape(prefix + table)}\]\]|{re.escape(table)}\s*=)")
-        places = [n for n, line in enumerate(self.lines) if head.match(line)]
-        line = None
-        if places:
-            line = places[min(index, len(places) - 1)]
-            for n in range(line + 1, len(self.lines)):
-                if not key or self.lines[n].lstrip().startswith("["):
-                    break
-                if re.match(rf"\s*{re.escape(key)}\s*=", self.lines[n]):
-                    line = n
-                    break
-        where = f"'{self.path}'" + (f", line {line + 1}" if line is not None else "")
-        return InputError(f"{where}: {message.rstrip('.')}.")
+    def located(self, message: str, *place: str | int) -> InputError:
+        """The error with the line of an entry: a top-level key, or a table with its number and a key of it."""
+        above = ("quick",) if place[0] in self.quick else ()
+        return self.root.fail(f"{message.rstrip('.')}.", *above, *place)
 
 
 def _size_of(value: Any) -> int:

@@ -28,16 +28,10 @@ def subfolder(parent: Path, name: str) -> Path:
     Raises
     ------
     InputError
-        If the name can lead out of `parent`, or if it is a symbolic link there: the folder behind a link was not given
-        by the user, so nothing is written or removed in it.
+        If the name can lead out of `parent`.
     """
     check_name("the name", name)
-    folder = parent / name
-    if folder.is_symlink():
-        raise InputError(
-            f"'{folder}' is a symbolic link, which is not followed; remove it or choose another directory."
-        )
-    return folder
+    return parent / name
 
 
 @contextmanager

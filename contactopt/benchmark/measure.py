@@ -15,8 +15,7 @@ import numpy as np
 
 from contactopt.benchmark.process import one_line
 from contactopt.benchmark.runs import Run
-from contactopt.benchmark.store import SCHEMA, STATUSES, pack
-from contactopt.benchmark.wire import ForeignMessage
+from contactopt.benchmark.store import SCHEMA, pack
 from contactopt.errors import InputError
 from contactopt.problem import (
     InterfaceProblem,
@@ -25,13 +24,10 @@ from contactopt.problem import (
 )
 from contactopt.problem.laws.associated import Associated
 
-ENDS = ("refused", "error", "backend_failed", "out_of_memory", "not_built")  # what a run without an answer may say
-MEASURED = ("call_seconds", "cpu_seconds", "peak_mb", "base_mb")  # columns that the worker fills
-
 
 @dataclass(frozen=True)
 class Task:
-    """A run with the experiment's limits. warm_up: run the method on a tiny problem first, once per process."""
+    """A run with the experiment's limits."""
 
     run: Run
     experiment: str
@@ -41,62 +37,24 @@ class Task:
     max_iterations: int
     seed: int
     diagnose: bool = False
-    warm_up: bool = True
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a worker says of a run. `status` is the method's own word; `reactions` None where there is no answer."""
+    """What a worker says of a run. `status` is the method's own word; `reactions` None where there is no answer.
+
+    measured  the columns call_seconds, cpu_seconds, peak_mb and base_mb, as far as they are known
+    """
 
     status: str
     message: str
     measured: dict[str, float]
-    reactions: np.ndarray | None
-    multipliers: np.ndarray | None
-    label: str
-    iterations: float
-    seconds: float
-    history: tuple[list[float], list[float], list[int]] | None
-
-    @classmethod
-    def of(cls, content: Any, problem: InterfaceProblem) -> Answer:
-        """From a message that code of the user may have written; ForeignMessage if anything in it does not fit."""
-        try:
-            reactions, multipliers = (_floats(content[name]) for name in ("reactions", "multipliers"))
-            answer = cls(
-                str(content["status"]),
-                one_line(str(content["message"])),
-                {name: float(content["measured"][name]) for name in MEASURED if name in content["measured"]},
-                reactions if reactions is None else reactions.reshape(problem.q.shape),
-                multipliers if multipliers is None else multipliers.reshape(problem.s.shape),
-                str(content["label"]),
-                float(content["iterations"]),
-                float(content["seconds"]),
-                _history(content["history"]),
-            )
-        except (LookupError, TypeError, ValueError, OverflowError) as error:
-            raise ForeignMessage("an answer of another form") from error
-        known = ENDS if answer.reactions is None else STATUSES
-        if answer.status not in known or min(answer.seconds, *answer.measured.values()) < 0:
-            raise ForeignMessage("an answer that makes no sense")
-        return answer
-
-
-def _floats(value: Any) -> np.ndarray | None:
-    if value is None:
-        return None
-    if not isinstance(value, np.ndarray) or value.dtype != np.dtype(float):
-        raise TypeError("an array of numbers is needed")
-    return value
-
-
-def _history(value: Any) -> tuple[list[float], list[float], list[int]] | None:
-    if value is None:
-        return None
-    residuals, seconds, iterations = value
-    if not len(residuals) == len(seconds) == len(iterations):
-        raise ValueError("columns of one length are needed")
-    return [float(x) for x in residuals], [float(x) for x in seconds], [int(x) for x in iterations]
+    reactions: np.ndarray | None = None
+    multipliers: np.ndarray | None = None
+    label: str = ""
+    iterations: float = np.nan
+    seconds: float = np.nan
+    history: tuple[list[float], list[float], list[int]] | None = None
 
 
 def blank(task: Task) -> dict[str, Any]:

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import queue
-import subprocess
 import threading
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
+from contactopt.benchmark import worker
 from contactopt.benchmark.measure import Answer, Task, blank, judge
 from contactopt.benchmark.problems import FAMILIES
 from contactopt.benchmark.process import START, Ended, Process, one_line
-from contactopt.benchmark.wire import ForeignMessage
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 
-START_LIMIT = 120.0  # s until a process answers at all
 BUILD_LIMIT = 1800.0  # s to build a problem
-STARTS = 3  # of a process that is killed before it says a word: once may be chance, each time is its limit of memory
-WARM_UP_LIMIT = 30.0  # s to import what a method needs, beyond its time limit
+WARM_UP = 30.0  # s at least for the first call of a method of this package, which imports what it needs
+PLUGIN_WARM_UP = 3.0  # s the same for a plug-in, whose file was loaded before
 MARGIN, GRACE = 1.1, 0.5  # the hard limit is MARGIN * time_limit + GRACE: methods may end by themselves first
-ROOM = 1e6  # bytes of a message beyond the arrays that it must hold
 DIAGNOSED = ("rank", "condition", "guaranteed_mu", "alternating_mu", "tresca_mu")
+_cold: set[str] = set()  # methods that did not survive their warm-up, in any worker of this process
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +48,11 @@ class Worker:
     """
 
     def __init__(self) -> None:
-        self.builder, self.solver = Process("build"), Process("solve")
+        self.builder, self.solver = Process(), Process()
         self.held: Built | None = None
         self.sent = ""  # label of the problem that the solver keeps
+        self.warm: set[tuple[str, int]] = set()  # methods and dimensions that were warmed up there
         self.doubted = ""  # method that failed in the process and may have left it in disorder
-        self.cold: set[str] = set()  # methods that did not survive their warm-up
         self.broken: dict[str, str] = {}  # problems that cannot be built -> how
 
     def __enter__(self) -> Worker:
@@ -62,14 +61,9 @@ class Worker:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    @property
-    def process(self) -> subprocess.Popen | None:
-        """The process that runs methods, if there is one now."""
-        return self.solver.process
-
     def close(self) -> None:
-        self.builder.close()
-        self.solver.close()
+        self.builder.kill()
+        self.solver.kill()
 
     def interrupt(self) -> None:
         """Let `run` end soon, from another thread."""
@@ -91,17 +85,17 @@ class Worker:
         begin = time.perf_counter()
         try:
             row |= judge(task, built.problem, self._answer(task, built))
-            if task.run.method.plugin is not None and not row["success"] and row["status"] != "refused":
-                self.doubted = task.run.method.label
-            return row
         except Ended as end:
-            row |= {"status": end.status, "message": end.message, "call_seconds": time.perf_counter() - begin}
             if end.phase == "neighbour":
-                row |= {
-                    "status": "not_built",
-                    "message": f"{end.status} while its warm start was sought: {end.message}",
-                }
-            return row
+                end.status, end.message = "not_built", f"{end.status} while its warm start was sought: {end.message}"
+            return row | {
+                "status": end.status,
+                "message": end.message,
+                "call_seconds": time.perf_counter() - begin,
+            }
+        if task.run.method.plugin is not None and not row["success"] and row["status"] != "refused":
+            self.doubted = task.run.method.label
+        return row
 
     def _build(self, task: Task) -> Built:
         """The task's problem, held or built anew."""
@@ -112,77 +106,68 @@ class Worker:
             return self.held
         self.held = None
         self.solver.start()  # imports at the same time
-        # A process that has loaded plug-ins builds nothing else: they may have changed the library there.
         foreign = spec.kind == "family" and spec.name not in FAMILIES
-        if foreign:
-            self.builder.kill()
         request = (spec, task.plugins if foreign else (), task.diagnose, task.memory_limit)
         try:
-            found = self.builder.ask(request, {START: BUILD_LIMIT}, 1e9 * task.memory_limit)
-            if "error" in found:
-                raise NotBuilt(one_line(str(found["error"])))
-            problem = replace(found["problem"])  # checked again, and nothing kept that was worked out elsewhere
-            facts = {"fingerprint": problem.fingerprint, "contacts": problem.contacts, "dim": problem.dim}
-            facts |= {"plates": len(problem.s), "build_seconds": float(found["build_seconds"])}
-            facts |= {name: float(found["diagnosis"][name]) for name in DIAGNOSED if found["diagnosis"]}
+            found = self.builder.ask(BUILD_LIMIT, "build", worker.build, *request)
+            how = one_line(found.get("error", ""))
         except Ended as end:
             how = f"{end.status} while the problem was built: {end.message}".rstrip(": ")
-            self.broken[spec.label] = how
-            raise NotBuilt(how) from end
-        except NotBuilt as error:
-            self.broken[spec.label] = str(error)
-            raise
-        except (LookupError, TypeError, ValueError) as error:
-            self.broken[spec.label] = f"what was built is no problem: {one_line(error)}"
-            raise NotBuilt(self.broken[spec.label]) from error
         finally:
-            if foreign:
+            if foreign:  # a plug-in may have changed the library there
                 self.builder.kill()
+        if how:
+            self.broken[spec.label] = how
+            raise NotBuilt(how)
+        problem = found["problem"]
+        facts = {"fingerprint": problem.fingerprint, "contacts": problem.contacts, "dim": problem.dim}
+        facts |= {"plates": len(problem.s), "build_seconds": found["build_seconds"], **found["diagnosis"]}
         self.held = Built(spec.label, problem, facts)
         return self.held
 
-    def _answer(self, task: Task, built: Built, starts: int = 1) -> Answer:
-        """What the method answers, at the first start of a process or a later one. Raises Ended if it did not outlive it."""
-        method = task.run.method.label
-        if self.doubted not in ("", method):
+    def _answer(self, task: Task, built: Built) -> Answer:
+        """What the method answers. Raises Ended if its process did not outlive it."""
+        if self.doubted not in ("", task.run.method.label):
             self._restart()
-        used = self.solver.running and bool(self.sent)
-        known = self.solver.running and self.sent == built.label
-        problem = None if known else built.problem
-        hard = MARGIN * task.time_limit + GRACE
-        limits = {START: START_LIMIT, "neighbour": BUILD_LIMIT, "warm up": WARM_UP_LIMIT + hard, "solve": hard}
-        room = ROOM + 16.0 * (built.problem.q.size + len(built.problem.s))
-        self.sent = built.label
-        try:
-            task = replace(task, warm_up=method not in self.cold)
-            answer = Answer.of(self.solver.ask((task, problem), limits, room), built.problem)
-        except ForeignMessage as error:
-            self._restart()
-            raise Ended("solve", "error", f"its process sent what it was not asked for: {error}") from error
-        except Ended as end:
-            self._restart()
-            if end.phase == "warm up":  # says nothing of the run itself
-                self.cold.add(method)
-                return self._answer(task, built)
-            if end.phase != START:
-                raise
-            if used:  # an earlier run left the process in disorder
-                return self._answer(task, built)
-            if end.status != "error" and starts < STARTS:
-                return self._answer(task, built, starts + 1)
-            if end.status != "error":
-                raise InputError(
-                    f"a worker process cannot start after {starts} trials ({end.status}, {end.message}); is memory_limit, "
-                    f"{task.memory_limit:g} GB, enough?"
-                ) from end
-            raise
+        answer = None
+        while answer is None:  # its process may have been replaced since it got the problem
+            try:
+                self._prepare(task, built)
+                hard = MARGIN * task.time_limit + GRACE
+                answer = self.solver.ask(hard, "solve", worker.execute, task)
+            except Ended as end:
+                self._restart()
+                if end.phase == START:
+                    raise InputError(
+                        f"a worker process cannot start ({end.status}, {end.message}); is there memory enough?"
+                    ) from end
+                if end.phase != "warm up":  # which says nothing of the run itself
+                    raise
+                _cold.add(task.run.method.name)
+            if answer is None:
+                self.sent = ""
         if answer.status == "out_of_memory":
             self._restart()  # its memory is fragmented at best
         return answer
 
+    def _prepare(self, task: Task, built: Built) -> None:
+        """Give the process the problem, a warm start if one is asked for, and the imports of the method."""
+        method, dim = task.run.method, built.problem.dim
+        if self.sent != built.label or not self.solver.running:
+            self.warm = self.warm if self.solver.running else set()
+            self.solver.ask(BUILD_LIMIT, "send", worker.hold, built.label, built.problem, task.plugins)
+            self.sent = built.label
+        if task.run.start == "warm":
+            self.solver.ask(BUILD_LIMIT, "neighbour", worker.find_start, built.label)
+        if (method.label, dim) not in self.warm and method.name not in _cold:
+            limit = max(MARGIN * task.time_limit + GRACE, WARM_UP if method.plugin is None else PLUGIN_WARM_UP)
+            self.solver.ask(limit, "warm up", worker.warm_up, task, dim)
+            self.warm.add((method.label, dim))
+
     def _restart(self) -> None:
         self.solver.kill()
         self.sent = self.doubted = ""
+        self.warm = set()
 
 
 class Shares:
@@ -261,6 +246,7 @@ _of_thread = threading.local()
 def _run_here(task: Task) -> dict[str, Any]:
     """One run, in a worker process that belongs to the calling thread: what a Dask worker executes."""
     if not hasattr(_of_thread, "worker"):
+        multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # it may have children
         _of_thread.worker = Worker()
     return _of_thread.worker.run(task)
 

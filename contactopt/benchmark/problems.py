@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from inspect import Signature
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.linalg as la
 
-from contactopt.benchmark.catalogue import Arguments, arguments_of, bind
+from contactopt.benchmark.catalogue import arguments_of
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.coulomb import Coulomb
@@ -37,7 +38,7 @@ class ProblemSpec:
         given = ", ".join(f"{key}={short_number(value)}" for key, value in self.parameters.items())
         return f"{self.name}({given})" if given else self.name
 
-    def check(self, declared: Mapping[str, Arguments]) -> None:
+    def check(self, declared: Mapping[str, Signature]) -> None:
         """InputError if the name or a parameter is unknown or out of range. Builds nothing.
 
         declared  arguments of the problems that plug-ins declare, by name
@@ -49,7 +50,7 @@ class ProblemSpec:
             if self.name not in families:
                 raise InputError(f"unknown family {self.name!r}; choose from {', '.join(families)}.")
             try:
-                bind(families[self.name], **self.parameters)
+                families[self.name].bind(**self.parameters)
             except TypeError as error:
                 raise InputError(f"family '{self.name}': {error}.") from error
 

@@ -1,32 +1,39 @@
-"""A process in which code of the user may run, seen from outside: start it, ask it, kill it, tell how it ended."""
+"""A process in which code of the user may run, seen from outside: start it, ask it, kill it, tell how it ended.
+
+The process is the one worker of an executor of loky, which starts it, carries calls and answers, and notices its death. What
+is added here: limits of time, the end of everything that the process started, and what it printed last.
+"""
 
 from __future__ import annotations
 
 import os
-import secrets
-import signal
-import socket
-import subprocess
-import sys
+import re
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future
 from contextlib import suppress
-from typing import Any
+from typing import IO, TYPE_CHECKING, Any
 
-from contactopt.benchmark import wire
-from contactopt.benchmark.wire import Channel, ForeignMessage
 from contactopt.errors import InputError
+
+if TYPE_CHECKING:
+    import psutil
 
 LIBRARIES = ("OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "BLIS_NUM", "NUMEXPR_NUM", "VECLIB_MAXIMUM", "RAYON_NUM")
 ONE_THREAD = {f"{name}_THREADS": "1" for name in LIBRARIES}
-START = "start"  # the phase from the request until the process says what it does
+MARK = "CONTACTOPT_CAMPAIGN"  # environment variable of all that a campaign starts: number and start time of its process
+START = "start"  # the phase until the process answers at all
+START_LIMIT = 120.0  # s for it
+STARTS = 3  # of a process that is killed in it: once may be chance, each time is its limit of memory
+BEAT = 0.1  # s between two looks at what a busy process printed
+MOST_WORDS = 10e6  # bytes of print that are kept on disk; more is thrown away
+KEPT_WORDS = 4000  # bytes of what a process printed last, which may tell why it ended
 MEMORY_WORDS = (b"MemoryError", b"bad_alloc", b"out of memory", b"Out of memory", b"Cannot allocate memory")
-KEPT_WORDS = 4000  # bytes of what a process printed last
 
 
 class Ended(Exception):
-    """The process ended, was killed at a limit, or sent what it was not asked for: `phase`, `status`, `message`."""
+    """The process ended by itself or was killed at a limit: `phase`, `status`, `message`."""
 
     def __init__(self, phase: str, status: str, message: str):
         super().__init__(message)
@@ -34,125 +41,161 @@ class Ended(Exception):
 
 
 class Process:
-    """One process at a time, started when it is first asked and again after it died. Use from one thread.
+    """One process at a time, started when it is first asked and again after it died. Use from one thread."""
 
-    role  what it does: a key of contactopt.benchmark.worker.ROLES
-    """
-
-    def __init__(self, role: str):
-        self.role = role
-        self.process: subprocess.Popen | None = None
-        self.channel: Channel
-        try:
-            self.noise = tempfile.TemporaryFile(mode="a+b")  # noqa: SIM115 (what solvers print)
-        except OSError as error:
-            raise InputError(f"a worker process needs a temporary file: {error.strerror or error}.") from error
+    def __init__(self) -> None:
+        self.executor: Any = None
+        self.number: int | None = None  # of the process, once it has answered
+        self.noise: IO[bytes]
+        self.ready: Future[int]
 
     @property
     def running(self) -> bool:
-        return self.process is not None
+        return self.executor is not None
 
     def start(self) -> None:
-        if self.process is not None:
+        """Let the process start, if there is none; nobody waits for it here."""
+        if self.executor is not None:
             return
-        ours, theirs = socket.socketpair()
-        code = "from contactopt.benchmark.worker import main; main()"
+        from loky import ProcessPoolExecutor
+
+        from contactopt.benchmark.worker import prepare
+
         try:
-            self.process = subprocess.Popen(
-                [sys.executable, "-c", code, str(theirs.fileno()), str(os.getpid()), self.role],
-                pass_fds=[theirs.fileno()],
-                stdin=subprocess.DEVNULL,
-                stdout=self.noise,
-                stderr=self.noise,
-                env=os.environ | ONE_THREAD,
-                process_group=0,  # so that what a solver starts dies with it
-            )
+            self.noise = tempfile.NamedTemporaryFile("a+b", delete=False)  # noqa: SIM115
+            quiet = {"PYTHONFAULTHANDLER": ""}  # a solver's last words tell more than the stack of a crashed process
+            environment = ONE_THREAD | quiet | {MARK: mark()}
+            told = (self.noise.name, os.getpid())
+            self.executor = ProcessPoolExecutor(1, env=environment, initializer=prepare, initargs=told)
+            self.ready = self.executor.submit(os.getpid)
         except OSError as error:
-            ours.close()
             raise InputError(f"a worker process cannot start: {error.strerror or error}.") from error
-        finally:
-            theirs.close()
-        self.channel = Channel(ours)
 
-    def ask(self, request: tuple[Any, ...], limits: Mapping[str, float], most: float) -> Any:
-        """What the process answers to a request.
+    def ask(self, limit: float, phase: str, function: Callable[..., Any], *arguments: Any) -> Any:
+        """What a function returns that the process calls.
 
-        limits  seconds of every phase that the process may enter, START included
-        most    bytes of the longest message
-        Raises Ended without an answer; the process is dead then. Each request carries a word of its own, made at
-        random. A message without it, as from a copy of the process that an earlier request left behind, is not taken for
-        an answer.
+        Parameters
+        ----------
+        limit
+            Seconds for the call, after which the process is killed.
+        phase
+            What the call is, for `Ended`.
+        function, arguments
+            What is called; both are pickled.
+
+        Returns
+        -------
+        object
+            What the function returned.
+
+        Raises
+        ------
+        Ended
+            If the process did not survive the call. A process that is killed before it answers at all is started anew,
+            STARTS times.
         """
-        self.start()
-        with suppress(OSError):
-            self.noise.truncate(0)
-        token, phase = secrets.token_hex(8), START
-        deadline = time.monotonic() + limits[phase]
-        try:
-            self.channel.send((token, *request), limits[phase])
-            while True:
-                kind, content = self._next(token, deadline, most)
-                if kind == "answer":
-                    return content
-                if kind != "phase" or content not in limits:
-                    raise ForeignMessage("an unknown message")
-                phase = content
-                deadline = time.monotonic() + limits[phase]
-        except TimeoutError:
-            self.kill()
-            raise Ended(phase, "killed", f"still running after {limits[phase]:g} s") from None
-        except ForeignMessage as error:
-            self.kill()
-            raise Ended(START, "error", f"its process sent what it was not asked for: {error}") from error
-        except (EOFError, OSError):
-            raise Ended(phase, *self._death()) from None
+        for trial in range(STARTS):
+            self.start()
+            if self.number is not None:
+                break
+            try:
+                self.number = self._wait(self.ready, START_LIMIT, START)
+                os.unlink(self.noise.name)
+            except Ended:
+                if trial == STARTS - 1:
+                    raise
+        return self._wait(self.executor.submit(function, *arguments), limit, phase)
 
-    def _next(self, token: str, deadline: float, most: float) -> tuple[str, Any]:
-        process = self.process
-        assert process is not None
-        message = wire.read(self.channel.receive(deadline, most, lambda: process.poll() is None))
-        if not isinstance(message, tuple) or len(message) != 3 or not isinstance(message[0], str):
-            raise ForeignMessage("a message of another form")
-        if not secrets.compare_digest(message[0].encode(), token.encode()):
-            raise ForeignMessage("an answer to another request")
-        return message[1], message[2]
+    def _wait(self, future: Future[Any], limit: float, phase: str) -> Any:
+        from loky.process_executor import BrokenProcessPool
 
-    def _death(self) -> tuple[str, str]:
+        deadline = time.monotonic() + limit
+        while True:
+            try:
+                return future.result(max(0.0, min(BEAT, deadline - time.monotonic())))
+            except BrokenProcessPool as error:
+                raise Ended(phase, *self._death(str(error.__cause__ or error) + str(error))) from None
+            except TimeoutError:
+                if os.fstat(self.noise.fileno()).st_size > MOST_WORDS:
+                    self.noise.truncate(0)
+                if time.monotonic() >= deadline:
+                    self.kill()
+                    raise Ended(phase, "killed", f"still running after {limit:g} s") from None
+
+    def _death(self, how: str) -> tuple[str, str]:
         """How the process ended by itself: (status, message)."""
-        assert self.process is not None
-        with suppress(subprocess.TimeoutExpired):
-            self.process.wait(5)
-        code = self.process.poll()
-        self.noise.seek(0, os.SEEK_END)
-        self.noise.seek(max(0, self.noise.tell() - KEPT_WORDS))
-        said = self.noise.read()
+        self.noise.seek(max(0, os.fstat(self.noise.fileno()).st_size - KEPT_WORDS))
+        said = self.noise.read(KEPT_WORDS)
         self.kill()
         last = said.strip().splitlines()[-1].decode(errors="replace") if said.strip() else ""
         if any(word in said for word in MEMORY_WORDS):
             return "out_of_memory", one_line(last)
-        if code == -signal.SIGKILL:
+        found = re.search(r"exit codes of the workers are \{(\w+)\((-?\d+)\)", how)
+        name, code = found.groups() if found else ("EXIT", "unknown")
+        if name == "SIGKILL":
             return "out_of_memory", "killed from outside, as the system does when memory runs out"
-        how = signal.Signals(-code).name if code is not None and code < 0 else f"exit code {code}"
-        return "crashed", one_line(f"{how}: {last}".rstrip(": "))
+        name = f"exit code {code}" if name == "EXIT" else name
+        return "crashed", one_line(f"{name}: {last}".rstrip(": "))
 
     def interrupt(self) -> None:
         """Kill the process from another thread; the one that uses it sees it end."""
-        process = self.process
-        if process is not None:
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)
+        if self.number is not None:
+            end_tree(self.number)
 
     def kill(self) -> None:
-        if self.process is None:
+        """End the process with all that it started."""
+        if self.executor is None:
             return
         self.interrupt()
-        self.process.wait()
-        self.channel.close()
-        self.process = None
-
-    def close(self) -> None:
-        self.kill()
+        self.executor.shutdown(wait=True, kill_workers=True)
         self.noise.close()
+        with suppress(OSError):
+            os.unlink(self.noise.name)
+        self.executor = self.number = None
+        end_orphans()
+
+
+def mark() -> str:
+    """What tells the processes of this campaign from all others: number and start of this process."""
+    import psutil
+
+    return f"{os.getpid()} {psutil.Process().create_time()}"
+
+
+def end_tree(number: int) -> None:
+    """Kill a process and what it started. What frees shared memory after them is left to end by itself."""
+    import psutil
+
+    with suppress(psutil.Error):
+        process = psutil.Process(number)
+        _kill([process, *process.children(recursive=True)])
+
+
+def end_orphans() -> None:
+    """Kill what solvers of this campaign, or of one that is dead, left behind in sessions of their own."""
+    import psutil
+
+    for process in psutil.process_iter():
+        with suppress(psutil.Error, ValueError):
+            if (found := process.environ().get(MARK)) is None:
+                continue
+            number, began = found.split()
+            alive = psutil.pid_exists(int(number)) and psutil.Process(int(number)).create_time() == float(began)
+            strange = os.getpid() not in (process.pid, *(parent.pid for parent in process.parents()))
+            if not alive or (int(number) == os.getpid() and strange):
+                _kill([process])
+
+
+def _kill(processes: Iterable[psutil.Process]) -> None:
+    import psutil
+
+    killed = []
+    for process in processes:
+        with suppress(psutil.Error):
+            if "resource_tracker" not in " ".join(process.cmdline()):
+                process.kill()
+                killed.append(process)
+    psutil.wait_procs(killed, timeout=1)
 
 
 def one_line(error: object) -> str:

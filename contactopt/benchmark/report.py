@@ -20,7 +20,6 @@ import html
 import io
 import os
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import module_from_spec, spec_from_file_location
@@ -34,6 +33,7 @@ from contactopt.benchmark.tables import TABLES, select
 from contactopt.checks import check_name
 from contactopt.errors import InputError
 from contactopt.files import remove_files, replace_file
+from contactopt.scenes.toml_table import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,11 +65,6 @@ QUESTIONS = (
     "Which chart answers which question? Speed against accuracy shows what a certified residual costs. A performance profile shows where methods "
     "fail, at its right end, and which is fast, at its left. A table of times by start shows what warm starts buy. A map shows for which numbers a "
     "method fails, and time against size how its cost grows."
-)
-# Whatever an experiment's texts hold, a browser loads nothing from elsewhere and runs no script.
-POLICY = (
-    '<meta http-equiv="Content-Security-Policy" '
-    "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
 )
 STYLE = """body{max-width:60rem;margin:2rem auto;padding:0 1rem;font:16px/1.5 system-ui,sans-serif;color:#222}
 table{border-collapse:collapse;font-size:13px;display:block;overflow-x:auto}td,th{border:1px solid #ccc;padding:.2rem .5rem}
@@ -108,10 +103,7 @@ def read_layout(path: str | Path) -> Layout:
         If the file cannot be read or asks for a figure that does not exist. The message names it.
     """
     path = Path(path)
-    try:
-        data = tomllib.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot read the experiment '{path}': {error}") from error
+    data = read_table(path, "experiment").data
     figures, columns = data.get("figures", []), data.get("columns", [])
     if not isinstance(figures, list) or not all(isinstance(entry, dict) for entry in figures):
         raise InputError(f"'{path}': 'figures' must be a list of tables, [[figures]].")
@@ -236,9 +228,9 @@ def write_report(layout: Layout, folder: Path, table: pd.DataFrame) -> str:
     InputError
         If a figure does not fit the table.
     """
-    parts = [f"# {_one_line(layout.title)}", _inert(layout.text.strip())]
+    parts = [f"# {_one_line(layout.title)}", layout.text.strip()]
     if layout.findings:
-        parts.append("\n".join(f"{n}. {_inert(text)}" for n, text in enumerate(_findings(layout, table), 1)))
+        parts.append("\n".join(f"{n}. {text}" for n, text in enumerate(_findings(layout, table), 1)))
     remove_files(folder, [old.name for old in folder.glob("figure-*.png")])
     for number, entry in enumerate(layout.figures or USUAL, 1):
         result = _drawn(layout, number, entry, table)
@@ -331,18 +323,13 @@ def _markdown(table: pd.DataFrame) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def _inert(text: object) -> str:
-    """Markdown in which raw HTML is text: a `<` that could open a tag is written as an entity."""
-    return re.sub(r"<(?=[A-Za-z/!?])", "&lt;", str(text))
-
-
 def _one_line(text: object) -> str:
-    return _inert(" ".join(str(text).split()))
+    return " ".join(str(text).split())
 
 
 def _literal(text: str) -> str:
-    """The text in a cell of a table: no HTML, no link, no picture, no end of the cell."""
-    return _one_line(text).replace("|", "\\|").replace("](", "]\\(")
+    """The text in a cell of a table."""
+    return _one_line(text).replace("|", "\\|")
 
 
 def _png(figure: Any) -> bytes:
@@ -356,7 +343,7 @@ def _png(figure: Any) -> bytes:
 
 
 def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
-    """Make one HTML page of reports. It stands alone and holds no script.
+    """Make one HTML page of reports. It stands alone.
 
     Parameters
     ----------
@@ -375,7 +362,7 @@ def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
         f'<section id="{html.escape(layout.name)}">{rendered(text, folder)}</section>'
         for layout, folder, text in bodies
     ]
-    head = f'<!doctype html><html lang="en"><meta charset="utf-8">{POLICY}<title>contactopt: benchmarks</title>'
+    head = '<!doctype html><html lang="en"><meta charset="utf-8"><title>contactopt: benchmarks</title>'
     head += f"<style>{STYLE}</style>"
     return f"{head}<h1>Benchmarks</h1><p>{QUESTIONS}</p><ul>{links}</ul>{''.join(sections)}</html>\n"
 
@@ -383,7 +370,7 @@ def page_of(bodies: Sequence[tuple[Layout, Path, str]]) -> str:
 def rendered(text: str, folder: Path) -> str:
     """Make HTML of Markdown, with the pictures of the report embedded.
 
-    Raw HTML is shown as text, and links lead only to the web and within the page.
+    Raw HTML is shown as text. Links to files beside the report become text, since the page may stand elsewhere.
 
     Parameters
     ----------
@@ -400,28 +387,11 @@ def rendered(text: str, folder: Path) -> str:
     from markdown_it import MarkdownIt
 
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
-    tokens = parser.parse(text)
-    for token in tokens:
-        opened: list[Any] = []
-        for child in token.children or ():
-            if child.type == "link_open":
-                opened.append(child)
-                child.hidden = not re.match(r"https?://|#", str(child.attrGet("href")))
-            elif child.type == "link_close":
-                child.hidden = opened.pop().hidden
-            elif child.type == "image":
-                _embed(child, folder)
-    return str(parser.renderer.render(tokens, parser.options, {}))
-
-
-def _embed(image: Any, folder: Path) -> None:
-    """Put the data of a report's own picture into its token; any other picture becomes its description."""
-    source = str(image.attrGet("src"))
-    file = folder / source
-    if re.fullmatch(r"figure-\d+\.png", source) and file.is_file() and not file.is_symlink():
-        image.attrSet("src", "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode())
-    else:
-        image.type, image.tag, image.children = "text", "", None
+    made = re.sub(r'<a href="(?!https?:|#)[^"]*">(.*?)</a>', r"\1", str(parser.render(text)))
+    for file in folder.glob("figure-*.png"):
+        data = base64.b64encode(file.read_bytes()).decode()
+        made = made.replace(f'src="{file.name}"', f'src="data:image/png;base64,{data}"')
+    return made
 
 
 def _plain(text: str) -> str:

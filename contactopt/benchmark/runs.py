@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
-from contactopt.benchmark.catalogue import Declared, bind
+from contactopt.benchmark.catalogue import Declared
 from contactopt.benchmark.problems import ProblemSpec, short_number
 from contactopt.errors import InputError
 from contactopt.solving.backends import CONIC, QP
@@ -47,9 +47,9 @@ class MethodSpec:
                 f"unknown method {self.name!r}; choose from {', '.join(METHODS)}, or name its plug-in file."
             )
         if self.plugin is not None:
-            given = {name: None for name in PASSED if name in self.plugin.names} | dict(self.settings)
+            given = {name: None for name in PASSED if name in self.plugin.arguments.parameters} | dict(self.settings)
             try:
-                bind(self.plugin.arguments, *[None] * (not self.plugin.iterates), **given)
+                self.plugin.arguments.bind(*[None] * (not self.plugin.iterates), **given)
             except TypeError as error:
                 raise InputError(f"method '{self.name}': {error}.") from error
         else:

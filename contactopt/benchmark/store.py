@@ -11,7 +11,6 @@ import fcntl
 import json
 import logging
 import os
-import stat
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -118,20 +117,14 @@ class Store:
     """The appending end, for one campaign at a time (file lock). Use as a context manager."""
 
     def __init__(self, folder: Path, resume: bool):
-        """InputError if the folder holds results and `resume` is not set, or if another campaign writes there.
-
-        A rows.jsonl that is a symbolic link is refused, as is a folder in which nothing can be written.
+        """InputError if the folder holds results and `resume` is not set, if another campaign writes there, or if
+        nothing can be written.
         """
         self.path = folder / "rows.jsonl"
-        if self.path.is_symlink():
-            raise InputError(f"'{self.path}' is a symbolic link, which is not followed; choose another --out.")
         with told(folder, "choose another --out"):
             folder.mkdir(parents=True, exist_ok=True)
-            flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW
+            flags = os.O_RDWR | os.O_CREAT | os.O_APPEND
             self.descriptor = os.open(self.path, flags, 0o644)
-        if not stat.S_ISREG(os.fstat(self.descriptor).st_mode):
-            os.close(self.descriptor)
-            raise InputError(f"'{self.path}' is no regular file; choose another --out.")
         try:
             fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:

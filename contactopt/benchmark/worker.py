@@ -1,29 +1,28 @@
-"""The processes in which code of the user runs: they receive requests over a socket and send answers back.
+"""What the processes do in which code of the user runs: list what plug-ins declare, build problems, run methods.
 
-They may crash, hang or run out of memory at any moment: contactopt.benchmark.process watches them from outside. There
-are three roles, each in a process of its own: one lists what plug-ins declare, one builds problems, one runs methods.
-What runs methods gets its problems from outside and judges nothing.
+They may crash, hang or run out of memory at any moment: contactopt.benchmark.process watches them from outside. Each keeps
+its plug-ins, its problem and what is imported from call to call. What runs methods gets its problems from outside and judges
+nothing.
 """
 
 from __future__ import annotations
 
 import os
-import socket
+import signal
 import sys
 import time
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from contactopt.benchmark.calls import call, measure, no_answer
-from contactopt.benchmark.measure import Task
+from contactopt.benchmark.catalogue import Catalogue, declared
+from contactopt.benchmark.measure import Answer, Task
 from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
-from contactopt.benchmark.wire import Channel
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.laws.coulomb import Coulomb
@@ -32,91 +31,123 @@ from contactopt.solving.driver import solve
 
 NEIGHBOUR = 0.9  # load and friction of the problem whose solution is the warm start
 UNBUILT = (InputError, MemoryError, ArithmeticError, ValueError, np.linalg.LinAlgError)
-Note = Callable[[str], None]
 
 
-class Runner:
-    """Runs methods, one request after another. It keeps the last problem, its warm start, and what is imported.
+@dataclass
+class Kept:
+    """What a process keeps: plug-ins, and the problem of that label with its warm start, or why it has none."""
 
-    A method's first run in a process is preceded by an untimed one on a problem of two contacts, so that imports and
-    compilation are not timed.
+    plugins: Registry = field(default_factory=Registry)
+    label: str = ""
+    problem: InterfaceProblem | None = None
+    start: Solution | None = None
+    missing: Exception | None = None
+
+
+_kept = Kept()
+
+
+def prepare(noise: str, parent: int) -> None:
+    """Make the process ready: it ends with its parent, leaves Ctrl-C to it, and prints into a file.
+
+    Parameters
+    ----------
+    noise
+        The file for all that is printed.
+    parent
+        The number of the process of the campaign.
     """
+    if sys.platform == "linux":
+        import ctypes
 
-    def __init__(self, note: Note):
-        self.note = note
-        self.plugins = Registry()
-        self.problem: InterfaceProblem
-        self.start: Solution | None = None
-        self.warm: set[tuple[str, int]] = set()
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: however the parent ends
+        if os.getppid() != parent:
+            os._exit(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    file = os.open(noise, os.O_WRONLY | os.O_APPEND)
+    for stream in (1, 2):
+        os.dup2(file, stream)
+    os.close(file)
 
-    def execute(self, task: Task, problem: InterfaceProblem | None) -> dict[str, Any]:
-        """The answer to one task, on a new problem or the one kept."""
+
+def inspect(paths: tuple[str, ...], names: list[str]) -> Catalogue | str:
+    """What plug-in files declare, and the entry points of these names; a sentence if a plug-in fails."""
+    try:
+        _kept.plugins.load(paths)
+        return declared(_kept.plugins, names)
+    except InputError as error:
+        return str(error)
+    except (Exception, SystemExit) as error:
+        return f"a plug-in cannot be used: {type(error).__name__}: {error}"
+
+
+def build(spec: ProblemSpec, paths: tuple[str, ...], diagnosed: bool, memory_limit: float) -> dict[str, Any]:
+    """A problem with the seconds that it took and its diagnosis, or {"error": sentence}."""
+    _limit_memory(memory_limit)
+    try:
+        _kept.plugins.load(paths)
+        begin = time.perf_counter()
+        problem = spec.build(_kept.plugins.problems)
+        seconds = time.perf_counter() - begin
+        if isinstance(problem.Q, InterfaceOperator):
+            raise InputError(
+                f"problem '{spec.label}' must have Q as a matrix; a benchmark hands it to other processes."
+            )
+        return {"problem": problem, "build_seconds": seconds, "diagnosis": _diagnosis(problem) if diagnosed else {}}
+    except (Exception, SystemExit) as error:
+        return {"error": one_line(error)}
+
+
+def hold(label: str, problem: InterfaceProblem, paths: tuple[str, ...]) -> None:
+    """Keep a problem and plug-ins for the runs that follow."""
+    _kept.plugins.load(paths)
+    _kept.label, _kept.problem, _kept.start, _kept.missing = label, problem, None, None
+
+
+def warm_up(task: Task, dim: int) -> None:
+    """Run the method untimed on a problem of two contacts, so that imports and compilation are not timed later."""
+    Q = np.eye(2 * dim) + 0.1
+    q = np.zeros((2, dim))
+    q[:, 0], q[:, 1] = -1.0, 0.5
+    own = os.getpid()
+    with suppress(Exception, SystemExit, KeyboardInterrupt):  # the run itself will tell
         _limit_memory(task.memory_limit)
-        self.note("solve")
-        if problem is not None:
-            self.problem, self.start = problem, None
-        self.plugins.load(task.plugins)
-        start = None
-        if task.run.start == "warm":
-            try:
-                start = self.warm_start()
-            except UNBUILT as error:
-                return no_answer("not_built", error)
-        if task.warm_up:
-            self.warm_up(task, self.problem.dim)
-        return measure(task, self.problem, start, self.plugins)
-
-    def warm_start(self) -> Solution:
-        """The certified solution of the same problem at NEIGHBOUR times its load and friction."""
-        if self.start is None:
-            self.note("neighbour")
-            problem = self.problem
-            q, s = (problem.q, NEIGHBOUR * problem.s) if len(problem.s) else (NEIGHBOUR * problem.q, problem.s)
-            self.start = solve(replace(problem, law=problem.law.times(NEIGHBOUR), q=q, s=s))
-            self.note("solve")
-        if not self.start.solved:
-            raise InputError(f"no warm start: {self.start.message}")
-        return self.start
-
-    def warm_up(self, task: Task, dim: int) -> None:
-        mark = (task.run.method.label, dim)
-        if mark in self.warm:
-            return
-        self.note("warm up")
-        Q = np.eye(2 * dim) + 0.1
-        q = np.zeros((2, dim))
-        q[:, 0], q[:, 1] = -1.0, 0.5
-        with suppress(Exception):  # the run itself will tell
-            call(task, InterfaceProblem(Q, q, Coulomb(np.full(2, 0.5))), None, self.plugins)
-        self.warm.add(mark)
-        self.note("solve")
+        call(task, InterfaceProblem(Q, q, Coulomb(np.full(2, 0.5))), None, _kept.plugins)
+    _only(own)
 
 
-class Builder:
-    """Builds problems, one request after another. It keeps what plug-ins declared."""
+def find_start(label: str) -> None:
+    """Solve the problem kept at NEIGHBOUR times its load and friction, for warm starts."""
+    problem = _kept.problem
+    if problem is None or _kept.label != label or _kept.start is not None:
+        return
+    q, s = (problem.q, NEIGHBOUR * problem.s) if len(problem.s) else (NEIGHBOUR * problem.q, problem.s)
+    try:
+        found = solve(replace(problem, law=problem.law.times(NEIGHBOUR), q=q, s=s))
+        if not found.solved:
+            raise InputError(f"no warm start: {found.message}")
+        _kept.start = found
+    except UNBUILT as error:
+        _kept.missing = error
 
-    def __init__(self) -> None:
-        self.plugins = Registry()
 
-    def build(self, spec: ProblemSpec, paths: tuple[str, ...], diagnosed: bool, memory_limit: float) -> dict[str, Any]:
-        """The problem with the seconds that it took and its diagnosis, or {"error": sentence}."""
-        _limit_memory(memory_limit)
-        try:
-            self.plugins.load(paths)
-            begin = time.perf_counter()
-            problem = spec.build(self.plugins.problems)
-            seconds = time.perf_counter() - begin
-            if isinstance(problem.Q, InterfaceOperator):
-                raise InputError(
-                    f"problem '{spec.label}' must have Q as a matrix; a benchmark hands it to other processes."
-                )
-            return {
-                "problem": problem,
-                "build_seconds": seconds,
-                "diagnosis": _diagnosis(problem) if diagnosed else {},
-            }
-        except (Exception, SystemExit) as error:
-            return {"error": one_line(error)}
+def execute(task: Task) -> Answer | None:
+    """The answer to one task; None if its problem is not kept here."""
+    problem, own = _kept.problem, os.getpid()
+    if problem is None or _kept.label != task.run.problem.label:
+        return None
+    if task.run.start == "warm" and _kept.start is None:
+        return no_answer("not_built", _kept.missing or "no warm start")
+    _limit_memory(task.memory_limit)
+    answer = measure(task, problem, _kept.start if task.run.start == "warm" else None, _kept.plugins)
+    _only(own)
+    return answer
+
+
+def _only(own: int) -> None:
+    """End this process if it is a copy of the true one, which a method made by forking and forgot."""
+    if os.getpid() != own:
+        os._exit(1)
 
 
 def _diagnosis(problem: InterfaceProblem) -> dict[str, float]:
@@ -132,50 +163,15 @@ def _diagnosis(problem: InterfaceProblem) -> dict[str, float]:
     }
 
 
-def _die_with_parent(parent: int) -> None:
-    """Linux: the kernel kills this process when the thread that started it ends, however that happens."""
-    if sys.platform == "linux":
-        import ctypes
-
-        ctypes.CDLL(None).prctl(1, 9)  # PR_SET_PDEATHSIG, SIGKILL
-        if os.getppid() != parent:
-            os._exit(1)
-
-
 def _limit_memory(gigabytes: float) -> None:
+    """Bound the data of this process; beyond what it holds now also all that is mapped, as shared memory is."""
     import resource
 
-    for kind in (resource.RLIMIT_DATA, resource.RLIMIT_CORE):
-        size = int(gigabytes * 1e9) if kind == resource.RLIMIT_DATA else 0
+    import psutil
+
+    size = int(gigabytes * 1e9)
+    limits = {resource.RLIMIT_DATA: size, resource.RLIMIT_CORE: 0}
+    limits[resource.RLIMIT_AS] = psutil.Process().memory_info().vms + size
+    for kind, limit in limits.items():
         with suppress(OSError, ValueError):
-            resource.setrlimit(kind, (size, resource.getrlimit(kind)[1]))
-
-
-def _serve_inspect(note: Note) -> Callable[..., Any]:
-    from contactopt.benchmark.catalogue import declare
-
-    return declare
-
-
-ROLES: dict[str, Callable[[Note], Callable[..., Any]]] = {
-    "inspect": _serve_inspect,
-    "build": lambda note: Builder().build,
-    "solve": lambda note: Runner(note).execute,
-}
-
-
-def main() -> None:
-    """Serve requests (word, *arguments) with messages (word, "phase" or "answer", content) until the socket closes."""
-    _die_with_parent(int(sys.argv[2]))
-    channel, own = Channel(socket.socket(fileno=int(sys.argv[1]))), os.getpid()
-    word = ""
-    serve = ROLES[sys.argv[3]](lambda phase: channel.send((word, "phase", phase)))
-    while True:
-        try:
-            word, *arguments = channel.wait()
-        except (EOFError, OSError):
-            return
-        answer = serve(*arguments)
-        if os.getpid() != own:  # a copy that the method made of this process by forking, and forgot
-            os._exit(1)
-        channel.send((word, "answer", answer))
+            resource.setrlimit(kind, (limit, resource.getrlimit(kind)[1]))

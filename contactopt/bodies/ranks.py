@@ -11,22 +11,15 @@ from __future__ import annotations
 
 import os
 import pickle
-import shutil
-import subprocess
-import sys
-import tempfile
 import threading
 import time
 import traceback
 import weakref
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
-from contactopt.checks import check_count
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Part, Scene
 
@@ -34,8 +27,6 @@ ORDERS, FIRST, TICKETS = 1, 2, 30000  # tag of orders, and tags of replies: one 
 SHORTEST, LONGEST = 1e-5, 1e-3  # sleep between two looks for a message [s]
 GROWTH = 1.15  # of that sleep from look to look, so that nobody waits longer than by about this share less one
 STARTED = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")  # set by mpiexec of Open MPI, and of MPICH and its kin
-OUTCOME = "CONTACTOPT_OUTCOME"  # environment variable: the file that takes the exit code of rank 0
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(eq=False)
@@ -329,74 +320,3 @@ def world() -> Any:
     except ImportError as error:
         raise InputError("ranks need the packages mpi4py and cloudpickle: pip install 'contactopt[mpi]'.") from error
     return comm if comm.size > 1 else None
-
-
-def launch(ranks: int, arguments: Sequence[str]) -> int:
-    """Start the command line on several ranks of this machine, each bound to a core while there are enough of them.
-
-    Every rank uses one BLAS thread unless the environment says otherwise.
-
-    Parameters
-    ----------
-    ranks
-        How many processes.
-    arguments
-        Of the command line, without the name of the program.
-
-    Returns
-    -------
-    int
-        The exit code of rank 0.
-
-    Raises
-    ------
-    InputError
-        If the packages of the extra `mpi` are missing.
-    """
-    start = mpiexec(ranks)
-    with tempfile.TemporaryDirectory() as folder:
-        outcome = Path(folder) / "exit code"
-        environment = {name: "1" for name in ONE_THREAD} | dict(os.environ) | {OUTCOME: str(outcome)}
-        command = [*start, sys.executable, "-m", "contactopt", *arguments]
-        code = subprocess.run(command, env=environment, check=False).returncode
-        return int(outcome.read_text()) if outcome.exists() else ended_early(code)
-
-
-def mpiexec(ranks: int) -> list[str]:
-    """The beginning of a command that runs on several ranks of this machine; InputError where MPI is missing."""
-    check_count("the number of ranks", ranks)
-    program = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or shutil.which("mpiexec")
-    if program is None or find_spec("mpi4py") is None:
-        raise InputError("ranks need mpi4py and mpiexec: pip install 'contactopt[mpi]'.")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    placed = ["--bind-to", "core", "--map-by", "core"] if ranks <= cores else ["--oversubscribe", "--bind-to", "none"]
-    root = (
-        ["--allow-run-as-root"] if getattr(os, "geteuid", lambda: 1)() == 0 else []
-    )  # whoever is root runs this as root
-    return [program, *root, *placed, "-n", str(ranks)]
-
-
-def ended_early(code: int) -> int:
-    """The exit code where rank 0 left none: a rank ended before the work was done, and mpiexec ended the others."""
-    why = f" by signal {code - 128}, which may mean that there was too little memory" if code > 128 else ""
-    print(f"contactopt: a rank was ended{why}; all others were stopped and nothing was written.", file=sys.stderr)
-    return code or 1
-
-
-def leave(code: int) -> int:
-    """Choose the exit code for mpiexec, which explains every code but 0 at length.
-
-    Parameters
-    ----------
-    code
-        The true exit code of this rank.
-
-    Returns
-    -------
-    int
-        0 where `launch` waits for the true code in a file, else the code itself.
-    """
-    if OUTCOME not in os.environ:
-        return code
-    Path(os.environ[OUTCOME]).write_text(str(code))
-    return 0

@@ -66,6 +66,11 @@ class StressMap:
     basis: skfem.CellBasis
     constants: tuple[float, float]
 
+    @property
+    def mesh(self) -> skfem.Mesh:
+        """The mesh of the body."""
+        return self.body.basis.mesh
+
     def stress(self, U: np.ndarray) -> np.ndarray:
         """Recover the stress.
 

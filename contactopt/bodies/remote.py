@@ -17,10 +17,12 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.elastic import AssembledElastic, ElasticBody, assemble_elastic
+from contactopt.bodies import resident
+from contactopt.bodies.elastic import AssembledElastic
 from contactopt.bodies.fields import Fields, Limits
-from contactopt.bodies.protocol import Guides, Surface
+from contactopt.bodies.protocol import Guides, Region, Surface
 from contactopt.bodies.ranks import Kept, RemotePart, Team, shipped, values_of
+from contactopt.bodies.recovery import StressMap
 from contactopt.errors import InputError
 from contactopt.problem.coupled import LocalTerm
 from contactopt.problem.operators import Product
@@ -42,18 +44,29 @@ def _sent(scene: Scene, part: Part) -> bytes:
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A vector of the unknowns of a body, on its rank, with the operators of an array that the callers of bodies use."""
+    """A vector of the unknowns of a body, on its rank, with the operators of an array that the callers of bodies use.
+
+    body   the Resident whose n unknowns these are; None for vectors of an iteration, which no map of contacts meets
+    known  its values on the contact unknowns (m,) where they are known here
+    """
 
     team: Team
     kept: Kept
+    body: Kept | None = None
+    known: np.ndarray | None = None
     elsewhere = True
+    __array_ufunc__ = None  # NumPy's arrays leave the operators to this class
 
     def _make(self, function: Any, other: Any) -> Field:
+        if isinstance(other, np.ndarray) and self.body is not None:  # forces on the contact unknowns
+            other = Field(self.team, self.team.keep(self.kept.rank, resident.Resident.force, self.body, other))
         own = other.kept if isinstance(other, Field) else other
-        return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, own))
+        return Field(self.team, self.team.keep(self.kept.rank, function, self.kept, own), self.body)
 
-    def __add__(self, other: Field) -> Field:
+    def __add__(self, other: Field | np.ndarray) -> Field:
         return self._make(operator.add, other)
+
+    __radd__ = __add__
 
     def __sub__(self, other: Field) -> Field:
         return self._make(operator.sub, other)
@@ -73,6 +86,21 @@ class Field:
     def __matmul__(self, other: Field) -> float:
         return float(self.team.ask(self.kept.rank, operator.matmul, self.kept, other.kept))
 
+    def __rmatmul__(self, T: sp.csr_matrix) -> np.ndarray:
+        """A map (rows, m) of the contact unknowns applied to the vector."""
+        known = self.known
+        if known is None:
+            known = self.team.ask(self.kept.rank, resident.Resident.on_contacts, self.body, self.kept)
+        return np.asarray(T @ known)
+
+    def any(self, axis: None = None, out: None = None) -> bool:
+        """Whether an entry is not zero, as numpy.any asks."""
+        return bool(self.team.ask(self.kept.rank, np.any, self.kept))
+
+    def sum(self, axis: None = None, out: None = None, **more: Any) -> float:
+        """The sum of all entries, as numpy.sum asks."""
+        return float(self.team.ask(self.kept.rank, np.sum, self.kept))
+
     def astype(self, kind: Any) -> Field:
         """The vector in another precision."""
         return self._make(np.ndarray.astype, kind)
@@ -80,163 +108,6 @@ class Field:
     def started_dot(self, other: Field) -> Callable[[], float]:
         """The scalar product, when it is called; the work begins now."""
         return self.team.start(self.kept.rank, dot, self.kept, other.kept)
-
-
-# ---- on the rank of the body ----
-
-
-@dataclass(frozen=True)
-class Resident:
-    """An elastic body on its rank, with the unknowns (m,) of its contact surfaces among its own."""
-
-    body: ElasticBody
-    skin: np.ndarray
-
-    def wide(self, T: sp.csr_matrix) -> sp.csr_matrix:
-        """A map (rows, m) of the contact unknowns as one (rows, n) of all unknowns."""
-        return sp.csr_matrix((T.data, self.skin[T.indices], T.indptr), (T.shape[0], len(self.body.at_rest)))
-
-    def force(self, F: np.ndarray) -> np.ndarray:
-        """Forces (m,) on the contact unknowns as nodal forces (n,)."""
-        full = np.zeros(len(self.body.at_rest))
-        full[self.skin] = F
-        return full
-
-
-@dataclass(frozen=True)
-class Facts:
-    """What rank 0 knows of a body, as in contactopt.bodies.protocol.Body, on its contact unknowns."""
-
-    name: str
-    unknowns: int
-    at_rest: np.ndarray
-    motions: np.ndarray
-    motion_names: tuple[str, ...]
-    resultants: np.ndarray
-    iterative: bool
-    complete: bool
-    equilibrated: bool
-
-
-def _skin(assembled: AssembledElastic) -> np.ndarray:
-    return np.sort(assembled.body.contact_dofs, axis=None)
-
-
-def _assembled(sent: bytes, elements: int, zone: float | None) -> AssembledElastic:
-    scene, part = pickle.loads(sent)
-    return assemble_elastic(scene, part, elements, zone)
-
-
-def _surface(assembled: AssembledElastic, name: str | None) -> bytes:
-    """The surface in terms of the contact unknowns alone, and its mesh by the nodes of the contact surfaces alone."""
-    body, skin, whole = assembled.body, _skin(assembled), assembled.surface(name)
-    place = np.full(len(body.load), -1)
-    place[skin] = np.arange(len(skin))
-    traces = tuple(
-        sp.csr_matrix((trace.data, place[trace.indices], trace.indptr), (trace.shape[0], len(skin)))
-        for trace in whole.traces
-    )
-    assert whole.mesh is not None
-    nodes = body.surface_nodes
-    number = np.full(whole.mesh.locations.shape[1], -1)
-    number[nodes] = np.arange(len(nodes))
-    mesh = replace(
-        whole.mesh,
-        faces=number[whole.mesh.faces],
-        locations=whole.mesh.locations[:, nodes],
-        unknowns=place[whole.mesh.unknowns[:, nodes]],
-        held=whole.mesh.held[skin],
-    )
-    return shipped(replace(whole, traces=traces, mesh=mesh))
-
-
-def _sizes(assembled: AssembledElastic) -> tuple[int, int]:
-    return assembled.unknowns, assembled.interface_unknowns
-
-
-def _prepared(assembled: AssembledElastic, solver: str, entries: bool) -> Resident:
-    return Resident(assembled.prepare(solver, entries), _skin(assembled))
-
-
-def _facts(own: Resident) -> Facts:
-    body, skin, equilibrated = own.body, own.skin, own.body.solver.iteration is not None
-    named, solved = (body.name, body.unknowns), (body.iterative, body.complete, equilibrated)
-    return Facts(*named, body.at_rest[skin], body.motions[skin], body.motion_names, body.resultants, *solved)
-
-
-def _term(own: Resident, T: sp.csr_matrix) -> LocalTerm:
-    assert own.body.equilibrium is not None
-    return own.body.equilibrium.term(own.wide(T))
-
-
-def _size(term: LocalTerm) -> tuple[int, tuple[np.ndarray, np.ndarray]]:
-    return term.size, term.low_rank
-
-
-def _trace(term: LocalTerm, X: np.ndarray) -> np.ndarray:
-    return term.started_trace(X)()
-
-
-def _stiffness(term: LocalTerm, X: np.ndarray) -> np.ndarray:
-    return term.stiffness(X)
-
-
-def _cycle(term: LocalTerm, F: np.ndarray) -> np.ndarray:
-    return term.cycle(F)
-
-
-def _product(own: Resident, T: sp.csr_matrix) -> Product:
-    return own.body.product(own.wide(T))
-
-
-def _act(product: Product, X: np.ndarray, accuracy: float | None) -> np.ndarray:
-    return product(X, accuracy)
-
-
-def _compliance(own: Resident, T: sp.csr_matrix) -> np.ndarray:
-    return own.body.compliance(own.wide(T))
-
-
-def _moved(own: Resident, T: sp.csr_matrix) -> np.ndarray:
-    return own.body.moved(own.wide(T))
-
-
-def _displacement(own: Resident, F: np.ndarray, multipliers: np.ndarray, free: np.ndarray | None) -> np.ndarray:
-    return own.body.displacement(own.force(F), multipliers, free)
-
-
-def _energy(own: Resident, U: np.ndarray) -> float:
-    return own.body.energy(U)
-
-
-def _external_forces(own: Resident, U: np.ndarray) -> np.ndarray:
-    return own.body.external_forces(U)
-
-
-def _held_by(own: Resident, U: np.ndarray, F: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """As ElasticBody.held_by, without the places on which no force acts."""
-    found = own.body.held_by(U, own.force(F))
-    acting = {name: forces.any(axis=0) for name, (_, forces) in found.items()}
-    return {name: (points[:, acting[name]], forces[:, acting[name]]) for name, (points, forces) in found.items()}
-
-
-def _fields(own: Resident, U: np.ndarray) -> Fields:
-    return own.body.fields(U)
-
-
-def _seen(own: Resident, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
-    return own.body.seen(own.wide(T), U)
-
-
-def _limits(own: Resident, U: np.ndarray, F: np.ndarray) -> Limits:
-    return own.body.limits(U, own.force(F))
-
-
-def _loaded(own: Resident, sent: bytes) -> Resident:
-    return replace(own, body=own.body.loaded(*pickle.loads(sent)))
-
-
-# ---- on rank 0 ----
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,16 +132,16 @@ class RemoteTerm:
         return self._make(LocalTerm.diagonal)
 
     def stiffness(self, X: Field) -> Field:
-        return self._make(_stiffness, X.kept)
+        return self._make(resident.stiffness, X.kept)
 
     def cycle(self, F: Field) -> Field:
-        return self._make(_cycle, F.kept)
+        return self._make(resident.cycle, F.kept)
 
     def pulled(self, r: np.ndarray) -> Field:
         return self._make(LocalTerm.pulled, r[self.rows])
 
     def started_trace(self, X: Field) -> Callable[[], np.ndarray]:
-        own = self.team.start(self.kept.rank, _trace, self.kept, X.kept)
+        own = self.team.start(self.kept.rank, resident.trace, self.kept, X.kept)
 
         def end() -> np.ndarray:
             u = np.zeros(self.length)
@@ -288,8 +159,8 @@ class RemoteEquilibrium:
 
     def term(self, T: sp.csr_matrix) -> RemoteTerm:
         team, rows = self.body.team, np.flatnonzero(np.diff(T.indptr))
-        kept = team.keep(self.body.kept.rank, _term, self.body.kept, T[rows])
-        size, low_rank = team.ask(kept.rank, _size, kept)
+        kept = team.keep(self.body.kept.rank, resident.term, self.body.kept, T[rows])
+        size, low_rank = team.ask(kept.rank, resident.size, kept)
         spread = sp.csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), (T.shape[0], len(rows)))
         return RemoteTerm(team, kept, rows, T.shape[0], size, (spread @ low_rank[0], spread @ low_rank[1]))
 
@@ -300,7 +171,7 @@ class RemoteBody:
 
     team: Team
     kept: Kept
-    facts: Facts
+    facts: resident.Facts
     parallel = True
 
     def _ask(self, function: Any, *arguments: Any) -> Any:
@@ -317,9 +188,9 @@ class RemoteBody:
     def unknowns(self) -> int:
         return self.facts.unknowns
 
-    @property
-    def at_rest(self) -> np.ndarray:
-        return self.facts.at_rest
+    @cached_property
+    def at_rest(self) -> Any:
+        return Field(self.team, self._keep(resident.whole), self.kept, self.facts.at_rest)
 
     @property
     def motions(self) -> np.ndarray:
@@ -346,44 +217,81 @@ class RemoteBody:
         return RemoteEquilibrium(self) if self.facts.equilibrated else None
 
     def product(self, T: sp.csr_matrix) -> Product:
-        made = self._keep(_product, T)
-        return lambda X, accuracy: self.team.ask(made.rank, _act, made, X, accuracy)
+        made = self._keep(resident.product, T)
+        return lambda X, accuracy: self.team.ask(made.rank, resident.act, made, X, accuracy)
 
     def convolution(self, T: sp.csr_matrix) -> None:
         return None
 
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
-        return np.asarray(self._ask(_compliance, T))
+        return np.asarray(self._ask(resident.compliance, T))
 
     def moved(self, T: sp.csr_matrix) -> np.ndarray:
-        return np.asarray(self._ask(_moved, T))
+        return np.asarray(self._ask(resident.moved, T))
 
-    def displacement(self, force: np.ndarray, multipliers: np.ndarray, free: Any = None) -> Any:
+    def _act(self, member: str, *arguments: Any) -> Any:
+        """What the member of that name returns on the rank of the body."""
+        return self._ask(resident.Resident.act, member, *map(_sendable, arguments))
+
+    def _field(self, member: str, *arguments: Any) -> Field:
+        """The same where it is a vector (n,), which stays there."""
+        return Field(self.team, self._keep(resident.Resident.act, member, *map(_sendable, arguments)), self.kept)
+
+    def displacement(self, force: Any, multipliers: np.ndarray, free: Any = None) -> Any:
         known = None if free is None else free.kept
-        return Field(self.team, self._keep(_displacement, force, multipliers, known))
+        own = self._keep(resident.Resident.act, "displacement", _sendable(force), multipliers, known)
+        return Field(self.team, own, self.kept)
+
+    def material_change(self, constant: str, U: Any, force: np.ndarray) -> tuple[Any, np.ndarray]:
+        made = self._keep(resident.Resident.act, "material_change", constant, _sendable(U), _sendable(force))
+        return self._item(made, 0), self.team.ask(made.rank, operator.getitem, made, 1)
+
+    def material_work(self, constant: str, U: Any, force: np.ndarray, dual: Any, W: Any) -> float:
+        return float(self._act("material_work", constant, U, force, dual, W))
+
+    def load_work(self, scene: Scene, part: Part, dual: Any, weights: np.ndarray, W: Any) -> float:
+        sent = _sent(scene, part)
+        return float(self._ask(resident.load_work, sent, _sendable(dual), weights, W.kept))
+
+    def energy_gradient(self, U: Any, force: np.ndarray) -> tuple[Any, Any]:
+        made = self._keep(resident.Resident.act, "energy_gradient", _sendable(U), _sendable(force))
+        return self._item(made, 0), self._item(made, 1)
+
+    def _item(self, made: Kept, number: int) -> Field:
+        return Field(self.team, self.team.keep(made.rank, operator.getitem, made, number), self.kept)
+
+    def energy_change(self, constant: str, U: Any, force: np.ndarray) -> float:
+        return float(self._act("energy_change", constant, U, force))
 
     def energy(self, U: Any) -> float:
-        return float(self._ask(_energy, U.kept))
+        return float(self._act("energy", U))
 
     def external_forces(self, U: Any) -> Any:
-        return Field(self.team, self._keep(_external_forces, U.kept))
+        return self._field("external_forces", U)
 
     def held_by(self, U: Any, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        found: dict[str, tuple[np.ndarray, np.ndarray]] = self._ask(_held_by, U.kept, force)
+        found: dict[str, tuple[np.ndarray, np.ndarray]] = self._ask(resident.held_by, U.kept, force)
         return found
 
-    def stress_map(self, region: object, by_poisson: bool = False) -> None:
-        return None
+    def recovery_errors(self, U: Any, *others: Any) -> tuple[np.ndarray, ...]:
+        return tuple(self._act("recovery_errors", U, *others))
+
+    def on_elements(self, values: np.ndarray) -> np.ndarray:
+        return np.asarray(self._act("on_elements", values))
+
+    def stress_map(self, region: Region, by_poisson: bool = False) -> RemoteStressMap:
+        made = self._keep(resident.Resident.act, "stress_map", region, by_poisson)
+        return RemoteStressMap(self, made, *self.team.ask(made.rank, resident.map_facts, made))
 
     def fields(self, U: Any) -> Fields:
-        found: Fields = self._ask(_fields, U.kept)
+        found: Fields = self._act("fields", U)
         return found
 
     def seen(self, T: sp.csr_matrix, U: Any) -> np.ndarray:
-        return np.asarray(self._ask(_seen, T, U.kept))
+        return np.asarray(self._ask(resident.seen, T, U.kept))
 
     def limits(self, U: Any, force: np.ndarray) -> Limits:
-        return Limits(*self._ask(_limits, U.kept, force))
+        return Limits(*self._act("limits", U, force))
 
     def grounded(self, modulus: float) -> RemoteBody:
         return self
@@ -392,11 +300,52 @@ class RemoteBody:
         return self
 
     def loaded(self, scene: Scene, part: Part) -> RemoteBody:
-        return _known(self.team, self._keep(_loaded, _sent(scene, part)))
+        return _known(self.team, self._keep(resident.loaded, _sent(scene, part)))
+
+
+def _sendable(value: Any) -> Any:
+    """An argument as its rank takes it: a vector that is there, forces on the contacts, or what it is."""
+    if isinstance(value, Field):
+        return value.kept
+    return resident.Forces(value) if isinstance(value, np.ndarray) else value
+
+
+@dataclass(frozen=True, eq=False)
+class RemoteStressMap:
+    """A contactopt.bodies.recovery.StressMap on the rank of its body, with its places and sources here."""
+
+    owner: RemoteBody
+    kept: Kept
+    places: np.ndarray
+    sources: np.ndarray
+
+    def _ask(self, function: Any, *arguments: Any) -> Any:
+        return self.owner.team.ask(self.kept.rank, function, self.kept, *arguments)
+
+    @property
+    def mesh(self) -> Any:
+        return pickle.loads(self._ask(resident.mesh))
+
+    def stress(self, U: Field) -> np.ndarray:
+        return np.asarray(self._ask(StressMap.stress, U.kept))
+
+    def deviation(self, U: Field, slopes: np.ndarray) -> np.ndarray:
+        return np.asarray(self._ask(StressMap.deviation, U.kept, slopes))
+
+    def elements(self, places: np.ndarray) -> np.ndarray:
+        return np.asarray(self._ask(StressMap.elements, places))
+
+    def size(self, number: int) -> float:
+        return float(self._ask(StressMap.size, number))
+
+    def transposed(self, slopes: np.ndarray) -> Field:
+        team = self.owner.team
+        made = team.keep(self.kept.rank, StressMap.transposed, self.kept, slopes)
+        return Field(team, made, self.owner.kept)
 
 
 def _known(team: Team, kept: Kept) -> RemoteBody:
-    return RemoteBody(team, kept, team.ask(kept.rank, _facts, kept))
+    return RemoteBody(team, kept, team.ask(kept.rank, resident.facts, kept))
 
 
 @dataclass(frozen=True, eq=False)
@@ -413,7 +362,7 @@ class AssembledRemote:
 
     @cached_property
     def _sizes(self) -> Sequence[int]:
-        found: tuple[int, int] = self._ask(_sizes)
+        found: tuple[int, int] = self._ask(resident.sizes)
         return found
 
     @property
@@ -431,14 +380,14 @@ class AssembledRemote:
         return bool(self._ask(AssembledElastic.iterates, solver))
 
     def surface(self, name: str | None = None) -> Surface:
-        found: Surface = pickle.loads(self._ask(_surface, name))
+        found: Surface = pickle.loads(self._ask(resident.surface, name))
         return found
 
     def facing(self, other: Surface, normals: np.ndarray) -> tuple[Surface, np.ndarray]:
         raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
 
     def prepare(self, solver: str, entries: bool) -> RemoteBody:
-        return _known(self.team, self.team.keep(self.kept.rank, _prepared, self.kept, solver, entries))
+        return _known(self.team, self.team.keep(self.kept.rank, resident.prepared, self.kept, solver, entries))
 
 
 def assemble_remote(scene: Scene, part: RemotePart, elements: int, zone: float | None) -> AssembledRemote:
@@ -458,5 +407,5 @@ def assemble_remote(scene: Scene, part: RemotePart, elements: int, zone: float |
     """
     team = part.team
     assert team is not None
-    kept = team.keep(part.rank, _assembled, _sent(scene, part), elements, zone)
+    kept = team.keep(part.rank, resident.assembled, _sent(scene, part), elements, zone)
     return AssembledRemote(team, kept, part.name)

@@ -11,8 +11,9 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from contactopt.bodies.ranks import Team, launch, leave, serve, world
-from contactopt.cli.commands import run
+from contactopt.bodies.launch import check_bodies, launch, leave
+from contactopt.bodies.ranks import Team, serve, world
+from contactopt.cli.commands import run, scene_asked
 from contactopt.cli.parser import make_parser
 from contactopt.errors import InputError
 
@@ -46,8 +47,14 @@ def _answered(command: Callable[[], int]) -> int:
     except InputError as error:
         print(f"contactopt: {error}", file=sys.stderr)
         return 2
-    except MemoryError:
-        print("contactopt: this needs more memory than there is; take fewer elements.", file=sys.stderr)
+    except MemoryError as error:
+        why = f" ({error})" if str(error) else ""
+        print(f"contactopt: this needs more memory than there is{why}; take fewer elements.", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        raise
+    except OSError as error:  # a name that no file can have, a disk that is gone
+        print(f"contactopt: cannot use '{error.filename}': {error.strerror or error}.", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("contactopt: interrupted", file=sys.stderr)
@@ -57,7 +64,9 @@ def _answered(command: Callable[[], int]) -> int:
 def _execute(options: argparse.Namespace, told: list[str]) -> int:
     """One command; where mpiexec started several ranks, rank 0 executes it and the others serve."""
     if (comm := world()) is None:
-        return int(options.command(options)) if options.ranks is None else launch(options.ranks, told)
+        if options.ranks is not None:
+            check_bodies(scene_asked(options), options.ranks)  # before any of them is started
+        return int(options.command(options)) if options.ranks in (None, 1) else launch(options.ranks, told)
     if comm.rank:
         serve(comm)
         return 0
@@ -73,6 +82,7 @@ def _on_ranks(options: argparse.Namespace) -> int:
         raise InputError("only the command 'run' uses several ranks; start the others without mpiexec.")
     if options.ranks not in (None, options.team.size):
         raise InputError(f"--ranks {options.ranks} was asked for, but mpiexec started {options.team.size} ranks.")
+    check_bodies(scene_asked(options), options.team.size)
     return run(options)
 
 

@@ -34,6 +34,34 @@ def _arguments_of(texts: list[str]) -> dict[str, Any]:
     return found
 
 
+def _changes(options: argparse.Namespace) -> dict[str, Any]:
+    """The arguments of the scene that the command line gives; InputError for one that is given twice."""
+    names = ("mu", "force", "degree", "simplices", "elements")
+    changes = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    given = _arguments_of(options.set)
+    if twice := sorted(set(given) & set(changes)):
+        raise InputError(f"{twice[0]!r} is given twice, by --set and by --{twice[0]}.")
+    return changes | given
+
+
+def scene_asked(options: argparse.Namespace) -> Any:
+    """Make the scene of the command `run`.
+
+    Parameters
+    ----------
+    options
+        The options of the command.
+
+    Returns
+    -------
+    Scene
+        The scene; of a load path its last state.
+    """
+    from contactopt.runner import scene_of
+
+    return scene_of(options.scene, **_changes(options))
+
+
 def run(options: argparse.Namespace) -> int:
     """Solve a scene, write its files and print its numbers.
 
@@ -55,13 +83,6 @@ def run(options: argparse.Namespace) -> int:
     from contactopt.runner import run
 
     out = options.out or f"out/{Path(options.scene).stem}"
-    names = ("mu", "force", "degree", "simplices")
-    changes = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-    given = _arguments_of(options.set)
-    twice = sorted(set(given) & {*changes, *(["elements"] if options.elements is not None else [])})
-    if twice:
-        raise InputError(f"{twice[0]!r} is given twice, by --set and by --{twice[0]}.")
-    elements = given.pop("elements", options.elements)
     silent = options.quiet or options.json
     result = run(
         options.scene,
@@ -73,7 +94,6 @@ def run(options: argparse.Namespace) -> int:
         Q=options.q,
         solver=options.solver,
         tol=options.tol,
-        elements=elements,
         accuracy=options.accuracy,
         quantity=options.quantity,
         adaptive=options.adaptive,
@@ -85,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
         html=options.html,
         note=lambda text: None if silent else print(f"  {text}", file=sys.stderr, flush=True),
         team=options.team,
-        **(changes | given),
+        **_changes(options),
     )
     if options.json:
         print(json.dumps(result.summary, indent=2))

@@ -10,6 +10,7 @@ from contactopt.analysis.quantities import READINGS
 from contactopt.benchmark.keys import help_text
 from contactopt.bodies.solvers import SOLVERS
 from contactopt.cli import commands
+from contactopt.cli.completion import SHELLS
 from contactopt.figures.style import FORMATS
 from contactopt.problem.operators import FORMS
 from contactopt.scenes import SCENES
@@ -113,7 +114,7 @@ def make_parser() -> argparse.ArgumentParser:
         "print a script with which a shell completes commands, options and names of scenes",
         commands.completion,
     )
-    completion.add_argument("shell", choices=("bash", "zsh", "fish"))
+    completion.add_argument("shell", choices=SHELLS)
     return parser
 
 

@@ -287,7 +287,7 @@ def _stress(step: Step, place: Place) -> Seeds:
         if which.kind not in MATERIAL or not which.concerns(part):
             return 0.0
         if which.kind == "E":
-            return found.value / found.map.body.material.E
+            return found.value / part.material.E  # type: ignore[union-attr]
         by_poisson = map_of(place, step.reduction, by_poisson=True)
         return float(np.sum(found.slopes * by_poisson.stress(U)))
 

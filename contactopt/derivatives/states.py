@@ -156,7 +156,7 @@ class Step:
         """
         problem = self.problem
         du, dmu = np.zeros(problem.q.shape), np.zeros(problem.contacts)
-        dU = [np.zeros(len(U)) for U in self.displaced]
+        dU = [0.0 * U for U in self.displaced]
         ds = [np.zeros(len(body.resultants)) for body in self.reduction.bodies]
         for which, amount in direction.items():
             if which.is_field:
@@ -176,7 +176,7 @@ class Step:
                     scene, other, step = self.loads(which, number)
                     old, new = self.reduction.bodies[number], self.reduction.bodies[number].loaded(scene, other)
                     moved, balance = (new.at_rest - old.at_rest) / step, (new.resultants - old.resultants) / step
-                dU[number] += amount * moved
+                dU[number] = dU[number] + amount * moved
                 ds[number] += amount * balance
         for B, own in zip(self.reduction.maps, dU):
             du += (B @ own).reshape(du.shape)

@@ -11,7 +11,10 @@ from __future__ import annotations
 
 import csv
 import html
+import io
 import json
+import warnings
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +22,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from contactopt.analysis.resultants import resultant_words
+from contactopt.checks import short
 from contactopt.errors import InputError
 from contactopt.figures.html import check_installed, packed, packed_short, write_html
 from contactopt.figures.output import STATES
@@ -58,13 +62,18 @@ def write_page(folder: str | Path, file: str | Path) -> Path:
     check_installed()
     folder = Path(folder)
     try:
-        summary = json.loads((folder / "summary.json").read_text())
-        data = page_data(folder, summary)
-    except (OSError, ValueError, KeyError) as error:
+        silent = io.StringIO()
+        with warnings.catch_warnings(action="ignore"), redirect_stderr(silent), redirect_stdout(silent):
+            summary = json.loads((folder / "summary.json").read_text())
+            data = page_data(folder, summary)
+            title, body = f"contactopt: {summary['scene']}", _body(summary, data)
+            json.dumps(data, allow_nan=False)
+    except (Exception, SystemExit) as error:  # a damaged file breaks its reader in any way; that of meshio exits
+        how = short(" ".join(str(error).split()) or type(error).__name__, 200).strip("'\"")
         raise InputError(
-            f"'{folder}' is not the folder of a finished run ({error}); make one with: contactopt run SCENE --out {folder}"
+            f"'{folder}' is not the folder of a finished run ({how}); make one with: contactopt run SCENE --out {folder}"
         ) from error
-    return write_html(file, f"contactopt: {summary['scene']}", _body(summary, data), data, ["view.js"])
+    return write_html(file, title, body, data, ["view.js"])
 
 
 def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 from skfem import MeshHex, MeshQuad, MeshTet, MeshTri
 
+from contactopt.checks import check_memory
 from contactopt.errors import InputError
 
 MOST_CELLS = 2e7  # of one mesh
+NEEDED = {2: 6e3, 3: 15e3}  # bytes of memory that a run takes for each cell in the plane and in space, at least
+FINEST = 1e-8  # shortest cell over the length of a grid; below it, places of nodes are lost in rounding
 
 
 def graded(length: float, first: float, growth: float) -> np.ndarray:
@@ -88,11 +91,20 @@ def tensor_mesh(*grids: np.ndarray) -> MeshQuad | MeshHex:
     Raises
     ------
     InputError
-        If the mesh would have more than MOST_CELLS cells.
+        If the mesh would have more than MOST_CELLS cells or need more memory than is free, and if a cell would be shorter
+        than FINEST of its grid.
     """
-    cells = np.prod([float(len(grid) - 1) for grid in grids])
+    cells = float(np.prod([float(len(grid) - 1) for grid in grids]))
     if cells > MOST_CELLS:
         raise InputError(f"a mesh of {cells:.0e} elements is more than {MOST_CELLS:.0e}; take fewer elements.")
+    check_memory(f"a mesh of {cells:.2g} elements", NEEDED[len(grids)] * cells)
+    for grid in grids:
+        size, shortest = np.ptp(grid), np.diff(grid).min()
+        if not shortest >= FINEST * size:
+            raise InputError(
+                f"elements of size {shortest:.2g} in a body of size {size:.2g} are lost in rounding; make the contact and its "
+                "body more alike in size, or take fewer elements."
+            )
     mesh = (MeshQuad if len(grids) == 2 else MeshHex).init_tensor(*grids)
     planes = {}
     for axis, (name, grid) in enumerate(zip("xyz", grids)):

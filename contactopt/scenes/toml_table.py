@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from collections.abc import Iterator
@@ -34,7 +35,20 @@ class Table:
         self.known: list[str] = []
 
     def fail(self, message: str, *below: str | int) -> InputError:
-        """The error to raise about this table, or about an entry of it."""
+        """Make the error to raise about this table, or about an entry of it.
+
+        Parameters
+        ----------
+        message
+            One sentence.
+        *below
+            The place of the entry below this table.
+
+        Returns
+        -------
+        InputError
+            The sentence after the name of the file and the line.
+        """
         place: Place = (*self.place, *below)
         while place and place not in self.lines:
             place = place[:-1]
@@ -58,7 +72,24 @@ class Table:
     def take(
         self, key: str, kind: type | tuple[type, ...], what: str, default: Any = None, needed: bool = False
     ) -> Any:
-        """The entry, which must be of that type; `what` names the type in a message."""
+        """Take an entry, which must be of one type.
+
+        Parameters
+        ----------
+        key
+            The name of the entry.
+        kind, what
+            Its type, and how a message names that.
+        default
+            What is returned where there is no entry.
+        needed
+            Whether that is an error instead.
+
+        Returns
+        -------
+        object
+            The value.
+        """
         if not self.has(key):
             if needed:
                 raise self.fail(f"{key!r} is missing{self._here()}; it is {what}.")
@@ -69,10 +100,35 @@ class Table:
         return value
 
     def text(self, key: str, default: str | None = None, needed: bool = False) -> Any:
+        """Take a text.
+
+        Parameters
+        ----------
+        key, default, needed
+            As for `take`.
+
+        Returns
+        -------
+        str or None
+            The text.
+        """
         return self.take(key, str, "a text in quotation marks", default, needed)
 
     def number(self, key: str, default: float | None = None, needed: bool = False, **limits: Any) -> Any:
-        """A finite number within the limits of check_number()."""
+        """Take a finite number.
+
+        Parameters
+        ----------
+        key, default, needed
+            As for `take`.
+        **limits
+            As for contactopt.checks.check_number.
+
+        Returns
+        -------
+        float, int or None
+            The number.
+        """
         value = self.take(key, (int, float), "a number", default, needed)
         if key in self.data:
             with self.about(key):
@@ -90,7 +146,18 @@ class Table:
         return values
 
     def table(self, key: str) -> Table | None:
-        """The table below an entry, None if there is none."""
+        """Take the table below an entry.
+
+        Parameters
+        ----------
+        key
+            The name of the entry.
+
+        Returns
+        -------
+        Table or None
+            None if there is no such entry.
+        """
         data = self.take(key, dict, "a table, { name = value, ... }")
         return None if data is None else Table(self.file, self.lines, data, (*self.place, key))
 
@@ -116,13 +183,15 @@ class Table:
         return " in " + ".".join(names).replace(".[", "[") if names else ""
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path, what: str = "scene file") -> Table:
     """Read the whole of a TOML file.
 
     Parameters
     ----------
     path
         The file.
+    what
+        What it is, in the words of a message.
 
     Returns
     -------
@@ -134,25 +203,23 @@ def read_table(path: Path) -> Table:
     InputError
         If there is no such file, if it is too long, or, with the line, if it is not TOML.
     """
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "is no file that can be read" if path.exists() else "does not exist"
-        raise InputError(f"scene file '{path}' {what}.")
+    if not os.path.isfile(path):  # unlike Path.is_file, it answers for names that no file can have
+        why = "does not exist" if not os.path.exists(path) else "is no file that can be read"
+        raise InputError(f"{what} '{path}' {'is a folder' if os.path.isdir(path) else why}.")
     if path.stat().st_size > MOST_BYTES:
-        raise InputError(
-            f"scene file '{path}' has more than {MOST_BYTES} bytes; meshes belong into files of their own."
-        )
+        raise InputError(f"{what} '{path}' has more than {MOST_BYTES} bytes; meshes belong into files of their own.")
     try:
         text = path.read_bytes().decode().replace("\r\n", "\n")
         return Table(path.name, lines_of(text) if tomllib.loads(text) else {}, tomllib.loads(text))
     except UnicodeDecodeError as error:
-        raise InputError(f"scene file '{path}' is no text in UTF-8.") from error
+        raise InputError(f"{what} '{path}' is no text in UTF-8.") from error
     except tomllib.TOMLDecodeError as error:
         found = re.search(r" \(at line (\d+), column \d+\)", str(error))
         line = int(found[1]) if found else text.count("\n") + 1
         said = re.sub(r" \(at .*\)", "", str(error))
         raise InputError(f"{path.name}, line {line}: {said[:1].lower()}{said[1:]}.") from error
     except (RecursionError, OSError) as error:
-        raise InputError(f"scene file '{path}' cannot be read: {type(error).__name__}.") from error
+        raise InputError(f"{what} '{path}' cannot be read: {type(error).__name__}.") from error
 
 
 def lines_of(text: str) -> dict[Place, int]:

@@ -15,7 +15,8 @@ import numpy as np
 
 from contactopt import Scene, reduce, reduce_bodies, scenes, solve
 from contactopt.analysis.solve_scene import Options, Solved, solve_scene
-from contactopt.bodies.ranks import Kept, Team, mpiexec, serve, spread, world
+from contactopt.bodies.launch import mpiexec
+from contactopt.bodies.ranks import Kept, Team, serve, spread, world
 from contactopt.scenes.slices import sliced
 from experiments.report import write
 
