@@ -35,6 +35,7 @@ from contactopt.solving.kernels.alart_curnier import (
     krylov,
     sparse,
 )
+from contactopt.solving.kernels.balance import settled
 from contactopt.solving.kernels.coupled import coupled_steps
 from contactopt.solving.kernels.krylov import model_of
 from contactopt.solving.methods import NATIVE, Iterate, Known
@@ -121,6 +122,10 @@ class Newton:
             aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
             sharp = replace(equations, Q=loosened(problem.Q, SHARP * aim))
             residual, error, balance, D = sharp.evaluate(r, multipliers)
+            better = settled(sharp, problem.law, r, multipliers, D) if len(problem.s) else None
+            if better is not None:
+                multipliers = better
+                residual, error, balance, D = sharp.evaluate(r, multipliers)
             yield (admissible(problem, r, error) if implicit else r + error, multipliers), residual
             rtol = forcing(residual, last)
             change = step(sharp, error, balance, D, rtol)
