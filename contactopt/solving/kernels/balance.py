@@ -13,13 +13,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contactopt.problem.cones import cylinder_derivative
+from contactopt.problem.cones import disc_derivative
 from contactopt.problem.laws import Law
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.semismooth import Equations, Projection
 
+COUNT = [0, 0]
 LEAST_FELT = 1e-8  # share of a motion that closed and sticking contacts must feel to hold it
 STEPS = 50  # of Newton's method
+SHARPER = 10.0  # by how much friction grows faster with the slip from one convex problem to the next
 SEARCH = 200  # evaluations of one line search
 EXACT = 1e-13  # relative error of the balance at which the search ends
 CURVATURE = 1e-10  # relative to V'V, added to the Newton matrix: nothing need be in contact at the start
@@ -71,6 +73,7 @@ def project_balanced(
             np.sum(way * project(z - t * rho * way)[0]) + s @ move
         )
         length = _least(slope, -float(error @ move))
+        COUNT[0] += 1
         if length == 0.0:
             break
         lam, z = lam + length * move, z - length * rho * way
@@ -82,7 +85,8 @@ def _least(slope: Callable[[float], float], first: float) -> float:
     low, high, below, above, t = 0.0, np.inf, first, np.inf, 1.0
     for trial in range(SEARCH):
         value = slope(t)
-        if abs(value) <= EXACT * abs(first):
+        COUNT[1] += 1
+        if abs(value) <= 0.1 * abs(first):
             return t
         if value < 0:
             low, below = t, value
@@ -137,9 +141,28 @@ def settled(
         return None
     u = (equations.Q @ r.ravel() + V @ multipliers).reshape(k, d) + equations.q
     y = r - equations.rho[:, None] * u
-    bound, low = law.bound(np.maximum(y[:, 0], law.lowest)), law.lowest
-    W = V @ loose
-    P, moved = project_balanced(
-        lambda z: cylinder_derivative(z, bound, low), y, W, loose.T @ equations.s, equations.rho, np.zeros(W.shape[1])
-    )
-    return multipliers + loose @ moved
+    normal = np.maximum(y[:, 0], law.lowest)
+    bound, slide = law.bound(normal), np.flatnonzero(closed & (law.bound(normal) > 0))
+    W = (V @ loose).reshape(k, d, -1)
+    s = loose.T @ equations.s + np.einsum("k,kp->p", np.where(closed, normal, 0.0), W[:, 0])
+    if len(slide) == 0:
+        return None
+    t, bound, rho = y[slide, 1:], bound[slide], equations.rho[slide]
+    W = W[slide, 1:].reshape(t.size, -1)
+    moved = np.zeros(loose.shape[1])
+    share = min(1.0, float(np.min(bound / np.maximum(np.linalg.norm(t, axis=1), bound), initial=1.0)))
+    while True:
+        moved = project_balanced(_softened(bound, share), t, W, s, rho, moved)[1]
+        if share == 1.0:
+            return multipliers + loose @ moved
+        share = min(1.0, SHARPER * share)
+
+
+def _softened(bound: np.ndarray, share: float) -> Projection:
+    """y -> the projection of share y on discs, and its derivative: friction that grows gradually with the slip."""
+
+    def project(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        P, D = disc_derivative(share * y, bound)
+        return P, share * D
+
+    return project
