@@ -18,10 +18,11 @@ from contactopt.problem.laws import Law
 from contactopt.solving.deadline import check_time
 from contactopt.solving.kernels.semismooth import Equations, Projection
 
-COUNT = [0, 0]
 LEAST_FELT = 1e-8  # share of a motion that closed and sticking contacts must feel to hold it
+DIRECT = 5  # steps of Newton's method that are tried without softened friction
+SURE = 1e-6  # error of the balance, over all friction bounds, with which a motion counts as found
 STEPS = 50  # of Newton's method
-SHARPER = 10.0  # by how much friction grows faster with the slip from one convex problem to the next
+SHARPER = 100.0  # by how much friction grows faster with the slip from one convex problem to the next
 SEARCH = 200  # evaluations of one line search
 EXACT = 1e-13  # relative error of the balance at which the search ends
 CURVATURE = 1e-10  # relative to V'V, added to the Newton matrix: nothing need be in contact at the start
@@ -34,6 +35,7 @@ def project_balanced(
     s: np.ndarray,
     step: np.ndarray | float,
     multipliers: np.ndarray,
+    steps: int = STEPS,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Solve r = P(y - rho V lambda), V' r + s = 0 for r and lambda.
 
@@ -46,6 +48,7 @@ def project_balanced(
     V, s : (k d, p) rigid motions and (p,) resultants
     step : rho, greater than 0: one number or one per contact (k,)
     multipliers : (p,) where lambda starts
+    steps : of Newton's method at most
 
     Returns
     -------
@@ -59,7 +62,7 @@ def project_balanced(
     size = np.abs(s) + np.abs(V).sum(axis=0) * 1e-3
     ridge = CURVATURE * np.diag(np.sum(rho[:, :, None] * V.reshape(k, d, -1) ** 2, axis=(0, 1)))
     z = y - rho * (V @ lam).reshape(k, d)
-    for _ in range(STEPS):
+    for _ in range(steps):
         check_time()
         P, D = project(z)
         error = V.T @ P.ravel() + s
@@ -73,7 +76,6 @@ def project_balanced(
             np.sum(way * project(z - t * rho * way)[0]) + s @ move
         )
         length = _least(slope, -float(error @ move))
-        COUNT[0] += 1
         if length == 0.0:
             break
         lam, z = lam + length * move, z - length * rho * way
@@ -85,7 +87,6 @@ def _least(slope: Callable[[float], float], first: float) -> float:
     low, high, below, above, t = 0.0, np.inf, first, np.inf, 1.0
     for trial in range(SEARCH):
         value = slope(t)
-        COUNT[1] += 1
         if abs(value) <= 0.1 * abs(first):
             return t
         if value < 0:
@@ -144,18 +145,21 @@ def settled(
     normal = np.maximum(y[:, 0], law.lowest)
     bound, slide = law.bound(normal), np.flatnonzero(closed & (law.bound(normal) > 0))
     W = (V @ loose).reshape(k, d, -1)
-    s = loose.T @ equations.s + np.einsum("k,kp->p", np.where(closed, normal, 0.0), W[:, 0])
+    s: np.ndarray = loose.T @ equations.s + np.einsum("k,kp->p", np.where(closed, normal, 0.0), W[:, 0])
     if len(slide) == 0:
         return None
     t, bound, rho = y[slide, 1:], bound[slide], equations.rho[slide]
     W = W[slide, 1:].reshape(t.size, -1)
-    moved = np.zeros(loose.shape[1])
-    share = min(1.0, float(np.min(bound / np.maximum(np.linalg.norm(t, axis=1), bound), initial=1.0)))
-    while True:
-        moved = project_balanced(_softened(bound, share), t, W, s, rho, moved)[1]
-        if share == 1.0:
-            return multipliers + loose @ moved
-        share = min(1.0, SHARPER * share)
+    none = np.zeros(loose.shape[1])
+    P, moved = project_balanced(_softened(bound, 1.0), t, W, s, rho, none, DIRECT)
+    if np.linalg.norm(W.T @ P.ravel() + s) > SURE * bound.sum():  # far away the friction must soften first
+        moved, share = none, float(np.min(bound / np.maximum(np.linalg.norm(t, axis=1), bound), initial=1.0))
+        while share < 1.0:
+            moved = project_balanced(_softened(bound, share), t, W, s, rho, moved)[1]
+            share *= SHARPER
+        P, moved = project_balanced(_softened(bound, 1.0), t, W, s, rho, moved)
+    balanced = np.linalg.norm(W.T @ P.ravel() + s) <= SURE * bound.sum()
+    return multipliers + loose @ moved if balanced else None
 
 
 def _softened(bound: np.ndarray, share: float) -> Projection:

@@ -97,7 +97,7 @@ class Linearised:
 
         # The border of the balance: K is the inverse of V' N (D rho V), the Schur complement for the rough inverse N.
         # Motions that no contact feels stay out of it.
-        shifts = (rho[:, None] * V).reshape(-1, d, p)
+        shifts = (rho[:, None] * V).reshape(n // d, d, p)
         border = (self.D[np.any(self.D != 0, axis=(1, 2))] @ shifts).reshape(n, p)
         Y = np.stack([apply(v) for v in border.T], axis=1) if p else V
         K = np.linalg.pinv(V.T @ Y, rcond=UNFELT)
