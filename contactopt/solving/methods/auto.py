@@ -197,7 +197,7 @@ class Auto:
             found, least = yield from _followed(method.steps(problem, start), first)
             warm = found or start
             note(logger, "Newton's method made no progress from the given start and begins anew without it")
-        found, residual = yield from _followed(method.steps(problem), tired)
+        found, residual = yield from _followed(method.steps(problem, None), tired)
         return (found if residual < least else warm) or cold_start(problem)
 
     @staticmethod
