@@ -113,7 +113,9 @@ class Auto:
         if start is not None and sp.issparse(problem.Q):
             reached = yield from self._proximal(problem, matrix, start, POLISH, LEAST_ALPHA)
         elif not sp.issparse(problem.Q):
-            reached = yield from self._proximal(problem, matrix, reached, NEARBY, LEAST_ALPHA)
+            residual = coulomb_equations(problem).evaluate(*reached)[0]
+            if residual <= NEARBY * np.linalg.norm(reached[0]):
+                reached = yield from self._proximal(problem, matrix, reached, 1, LEAST_ALPHA, aim=residual / 2)
         interior = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         if interior:
             for full in (True, False):
@@ -234,11 +236,20 @@ class Auto:
 
     @staticmethod
     def _proximal(
-        problem: InterfaceProblem, matrix: Blocks, start: Iterate, patience: int, alpha: float, gentle: bool = False
+        problem: InterfaceProblem,
+        matrix: Blocks,
+        start: Iterate,
+        patience: int,
+        alpha: float,
+        gentle: bool = False,
+        aim: float = np.inf,
     ) -> Generator[Iterate | Known, None, Iterate]:
-        """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last."""
+        """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last.
+
+        aim  residual that the first of these rounds must reach
+        """
         equations = proximal_equations(problem, matrix)
-        best, target, point = np.inf, np.inf, start
+        best, target, point = np.inf, aim, start
         for done, point in enumerate(proximal_iterates(equations, start, alpha, gentle), start=1):
             try:
                 yield point
