@@ -21,7 +21,6 @@ from contactopt.problem.operators import (
     shifted,
 )
 from contactopt.scenes import make_scene
-from contactopt.solving.constants import PATIENCE
 from contactopt.solving.kernels.alart_curnier import coulomb_equations
 from contactopt.solving.kernels.krylov import krylov_step, model_of
 from contactopt.solving.kernels.subproblems import KrylovSubproblem

@@ -72,8 +72,10 @@ def project_balanced(
         DV = np.einsum("kab,kbp->kap", rho[:, :, None] * D, V.reshape(k, d, -1)).reshape(V.shape)
         move = np.linalg.solve(V.T @ DV + ridge, error)
         way = (V @ move).reshape(k, d)
-        slope = lambda t, z=z, way=way, move=move: -float(  # noqa: E731
-            np.sum(way * project(z - t * rho * way)[0]) + s @ move
+        slope = lambda t, z=z, way=way, move=move: (
+            -float(  # noqa: E731
+                np.sum(way * project(z - t * rho * way)[0]) + s @ move
+            )
         )
         length = _least(slope, -float(error @ move))
         if length == 0.0:
@@ -105,9 +107,7 @@ def _least(slope: Callable[[float], float], first: float) -> float:
     return 0.0 if high == np.inf else high
 
 
-def settled(
-    equations: Equations, law: Law, r: np.ndarray, multipliers: np.ndarray, D: np.ndarray
-) -> np.ndarray | None:
+def settled(equations: Equations, law: Law, r: np.ndarray, multipliers: np.ndarray, D: np.ndarray) -> np.ndarray | None:
     """Find multipliers with which friction balances the motions that no closed or sticking contact holds.
 
     Newton's method linearises the contacts. Where all of them slip, their forces do not change with such a motion, and its

@@ -142,9 +142,7 @@ class Auto:
             note(logger, "the proximal loop got nowhere and started again from random forces")
 
     @staticmethod
-    def _jammed(
-        problem: InterfaceProblem, matrix: Blocks, reached: Iterate
-    ) -> Generator[Iterate | Known, None, None]:
+    def _jammed(problem: InterfaceProblem, matrix: Blocks, reached: Iterate) -> Generator[Iterate | Known, None, None]:
         """Without end: paths drawn at random, and the gentle proximal loop from the best point so far."""
         from contactopt.solving.methods.cone import AcaryCadoux
 
