@@ -72,11 +72,10 @@ def project_balanced(
         DV = np.einsum("kab,kbp->kap", rho[:, :, None] * D, V.reshape(k, d, -1)).reshape(V.shape)
         move = np.linalg.solve(V.T @ DV + ridge, error)
         way = (V @ move).reshape(k, d)
-        slope = lambda t, z=z, way=way, move=move: (
-            -float(  # noqa: E731
-                np.sum(way * project(z - t * rho * way)[0]) + s @ move
-            )
-        )
+
+        def slope(t: float, z: np.ndarray = z, way: np.ndarray = way, work: float = float(s @ move)) -> float:
+            return -float(np.sum(way * project(z - t * rho * way)[0])) - work
+
         length = _least(slope, -float(error @ move))
         if length == 0.0:
             break
@@ -107,8 +106,31 @@ def _least(slope: Callable[[float], float], first: float) -> float:
     return 0.0 if high == np.inf else high
 
 
-def settled(equations: Equations, law: Law, r: np.ndarray, multipliers: np.ndarray, D: np.ndarray) -> np.ndarray | None:
-    """Find multipliers with which friction balances the motions that no closed or sticking contact holds.
+def loose_motions(V: np.ndarray, D: np.ndarray) -> np.ndarray:
+    """Find the motions that no closed contact holds along its normal and no sticking one at all.
+
+    Parameters
+    ----------
+    V
+        (k d, p) rigid motions.
+    D
+        (k, d, d) derivative of the law's map.
+
+    Returns
+    -------
+    ndarray
+        (p, j) orthonormal columns, combinations of the multipliers.
+    """
+    d = D.shape[1]
+    firm = np.repeat(np.all(np.eye(d) == D, axis=(1, 2))[:, None], d, axis=1)
+    firm[:, 0] = np.any(D != 0, axis=(1, 2))
+    felt = V[firm.ravel()]
+    values, motions = np.linalg.eigh(felt.T @ felt)
+    return np.asarray(motions[:, values <= LEAST_FELT * max(values.max(initial=0.0), 1.0)])
+
+
+def settled(equations: Equations, law: Law, r: np.ndarray, u: np.ndarray, loose: np.ndarray) -> np.ndarray | None:
+    """Find the change of the multipliers with which friction balances motions that no contact holds.
 
     Newton's method linearises the contacts. Where all of them slip, their forces do not change with such a motion, and its
     system says nothing about it: it is singular, or its steps jump to and fro over the contact that should stick. Here the
@@ -120,46 +142,38 @@ def settled(equations: Equations, law: Law, r: np.ndarray, multipliers: np.ndarr
         The equations of contact and friction.
     law
         Their law.
-    r, multipliers
-        (k, d) forces and (p,) multipliers.
-    D
-        (k, d, d) derivative of the law's map there.
+    r, u
+        (k, d) forces and displacements.
+    loose
+        (p, j) the motions, as `loose_motions` finds them.
 
     Returns
     -------
     ndarray or None
-        Multipliers (p,); None if there is nothing to find.
+        The change (p,); None if no friction balances the loads.
     """
-    V, (k, d) = equations.V, r.shape
-    closed = np.any(D != 0, axis=(1, 2))
-    stuck = closed & np.all(np.abs(D - np.eye(d)) == 0, axis=(1, 2))
-    firm = np.zeros((k, d), dtype=bool)
-    firm[:, 0], firm[:, 1:] = closed, stuck[:, None]
-    felt = V * firm.reshape(-1, 1)
-    values, motions = np.linalg.eigh(felt.T @ felt)
-    loose = motions[:, values <= LEAST_FELT * max(values.max(), 1.0)]
-    if loose.shape[1] == 0:
-        return None
-    u = (equations.Q @ r.ravel() + V @ multipliers).reshape(k, d) + equations.q
+    k, d = r.shape
     y = r - equations.rho[:, None] * u
     normal = np.maximum(y[:, 0], law.lowest)
-    bound, slide = law.bound(normal), np.flatnonzero(closed & (law.bound(normal) > 0))
-    W = (V @ loose).reshape(k, d, -1)
-    s: np.ndarray = loose.T @ equations.s + np.einsum("k,kp->p", np.where(closed, normal, 0.0), W[:, 0])
-    if len(slide) == 0:
+    bound, W = law.bound(normal), (equations.V @ loose).reshape(k, d, -1)
+    s = loose.T @ equations.s + normal @ W[:, 0]
+    slide = bound > 0
+    if not slide.any():
         return None
-    t, bound, rho = y[slide, 1:], bound[slide], equations.rho[slide]
-    W = W[slide, 1:].reshape(t.size, -1)
-    none = np.zeros(loose.shape[1])
-    P, moved = project_balanced(_softened(bound, 1.0), t, W, s, rho, none, DIRECT)
-    if np.linalg.norm(W.T @ P.ravel() + s) > SURE * bound.sum():  # far away the friction must soften first
-        moved, share = none, float(np.min(bound / np.maximum(np.linalg.norm(t, axis=1), bound), initial=1.0))
+    t, bound, rho, W = y[slide, 1:], bound[slide], equations.rho[slide], W[slide, 1:].reshape(-1, W.shape[2])
+
+    def balanced(moved: np.ndarray, share: float, steps: int = STEPS) -> tuple[np.ndarray, bool]:
+        P, moved = project_balanced(_softened(bound, share), t, W, s, rho, moved, steps)
+        return moved, bool(np.linalg.norm(W.T @ P.ravel() + s) <= SURE * bound.sum())
+
+    moved, found = balanced(np.zeros(len(s)), 1.0, DIRECT)
+    if not found:  # far away the friction must soften first
+        share = float(np.min(bound / np.maximum(np.linalg.norm(t, axis=1), bound), initial=1.0))
+        moved = np.zeros(len(s))
         while share < 1.0:
-            moved = project_balanced(_softened(bound, share), t, W, s, rho, moved)[1]
-            share *= SHARPER
-        P, moved = project_balanced(_softened(bound, 1.0), t, W, s, rho, moved)
-    balanced = np.linalg.norm(W.T @ P.ravel() + s) <= SURE * bound.sum()
-    return multipliers + loose @ moved if balanced else None
+            moved, share = balanced(moved, share)[0], SHARPER * share
+        moved, found = balanced(moved, 1.0)
+    return loose @ moved if found else None
 
 
 def _softened(bound: np.ndarray, share: float) -> Projection:
