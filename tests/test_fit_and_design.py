@@ -31,6 +31,12 @@ def test_clean_data_give_back_their_parameters(loop, shift):
     assert len(ax.lines) >= 1
 
 
+def test_a_start_where_contacts_stick_does_not_hide_friction(loop, shift):
+    found = contactopt.fit(loop, {"shift": shift}, "mu", start={"mu": 30.0})
+    assert found.values["mu"] == pytest.approx(0.5, rel=1e-6) and found.identifiable["mu"]
+    assert "went on from less of it" in found.message
+
+
 def test_the_interval_is_that_of_linear_regression_at_the_solution(loop, shift):
     """Against the covariance from a Jacobian by central differences of solved paths."""
     sigma, rng = 0.002, np.random.default_rng(3)

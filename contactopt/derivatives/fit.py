@@ -13,7 +13,7 @@ Sources: Bates, Watts (1988), Nonlinear regression analysis and its applications
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +35,7 @@ logger = logging.getLogger(__name__)
 CONFIDENCE = 0.95
 BLIND = 1e-8  # singular values below this fraction of the largest tell nothing
 SHARE = 1e-3  # of such a direction, from which on a parameter is not identifiable
+HALVINGS = 10  # of the friction coefficients that are tried where contacts stick
 LIMITS = {"E": (1e-12, np.inf), "nu": (-0.999, 0.4999), "mu": (0.0, np.inf)}  # E over its first value
 
 
@@ -209,12 +210,45 @@ def fit(
     def jacobian(x: np.ndarray) -> np.ndarray:
         return stacked(model.slopes(size * x), False) * size
 
-    found = least_squares(
-        misfit, first / size, jacobian, (low / size, high / size), "trf", 1e-10, 1e-9, 1e-10, max_nfev=evaluations
-    )
+    def minimised(x: np.ndarray) -> Any:
+        limits = low / size, high / size
+        return least_squares(misfit, x, jacobian, limits, "trf", 1e-10, 1e-9, 1e-10, max_nfev=evaluations)
+
+    found = minimised(first / size)
+    spread = np.sqrt(2 * found.cost / max(count - len(which), 1)) if noise is None else 1.0
+    told = np.linalg.norm(jacobian(found.x), axis=0) * np.abs(found.x) > spread
+    sticks = np.array([one.kind == "mu" for one in which]) & ~told
+    if sticks.any():
+        slipping = _slipping(misfit, found.x, sticks, low / size)
+        if slipping is not None:
+            found = _better(found, minimised(slipping))
     values = size * found.x
     J = stacked(model.slopes(values), False)
     return _result(model, which, values, J, found, sigma, noise is None)
+
+
+def _slipping(
+    misfit: Callable[[np.ndarray], np.ndarray], x: np.ndarray, sticks: np.ndarray, low: np.ndarray
+) -> np.ndarray | None:
+    """The best point with less friction, where the data hardly know friction because contacts stick; None if there is none.
+
+    sticks  (p,) mask of the friction coefficients that do not matter at x
+    """
+    points = [np.where(sticks, np.maximum(x / 2**i, low + 1e-3 * (x - low)), x) for i in range(1, HALVINGS + 1)]
+    here = misfit(x)
+    costs = [float(np.sum(residuals**2)) for residuals in map(misfit, points)]
+    told = [(cost, i) for i, cost in enumerate(costs) if np.isfinite(cost) and cost != np.sum(here**2)]
+    return points[min(told)[1]] if told else None
+
+
+def _better(found: Any, other: Any) -> Any:
+    """The optimum of the smaller cost; the second one says how it was found."""
+    if not other.cost < found.cost:
+        return found
+    told = "contacts stick at the first values, where the data hardly know friction; the fit went on from less of it"
+    logger.info(told)
+    other.message = f"{other.message} ({told})"
+    return other
 
 
 def _result(

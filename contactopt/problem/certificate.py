@@ -5,8 +5,10 @@ d = Q r, w = q + V lambda and u = d + w, |.| the length of one contact's block a
 
     L = the largest of  min(1, |r_i| / (1e-6 F0)) |d_i|   (displacements that the forces make where they act),
                         max(-w_n, 0)                      (overlaps that the forces must remove),
-                        min |w_n|                         (the narrowest gap), and
-                        1e-6 min(1, |r_i| / (1e-6 F0)) |q_i|   (what rounding leaves of gaps that motions closed);
+                        min |w_n|                         (the narrowest gap),
+                        1e-6 min(1, |r_i| / (1e-6 F0)) |q_i|   (what rounding leaves of gaps that motions closed), and
+                        1e-6 c min(F0, S)                 (what it leaves of displacements that cancel, as those of a
+                                                           uniform pressure on a periodic half-space);
     F = min(F0, max(L / c, S)), at least 1e-5 max(L / c, S), with the mean compliance c = sum |r_i| c_i / sum |r_i| and
         the force on a plate S = max_j |s_j| / max_i |V_ij|; c_i is the mean of the diagonal of Q over block i.
 
@@ -48,7 +50,7 @@ from contactopt.problem.operators import diagonal
 from contactopt.problem.stacked import Stacked
 
 ACTS = 1e-6  # share of the largest force from which on a contact's displacement counts fully in L
-ROUNDED = 1e-6  # share of a closed gap below which its remainder is rounding, where bodies move rigidly
+ROUNDED = 1e-6  # share of a closed gap, or of a displacement that cancels, below which its remainder is rounding
 DUST = 1e-5  # share of the force that closes the gaps below which forces are rounding
 STIFFEST = 1e4  # largest rho_i, over the mean one
 
@@ -148,13 +150,14 @@ def yardsticks(problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.nd
         float(np.min(np.abs(w[:, 0]))),
         ROUNDED * float(np.max(weight * np.linalg.norm(problem.q, axis=1))),
     )
-    if length == 0:
-        length = _least_displacement(r, d + w)
-    compliance = _compliances(problem)
+    compliance, plates = _compliances(problem), _plate_force(problem)
     moves = compliance > 0
     shares = np.where(moves, size, 0.0) if np.any(size[moves] > 0) else moves.astype(float)
     mean = float(shares @ compliance / shares.sum()) if shares.any() else 0.0
-    natural = max(length / mean if mean > 0 else 0.0, _plate_force(problem))
+    length = max(length, ROUNDED * mean * min(largest, plates))
+    if length == 0:
+        length = _least_displacement(r, d + w)
+    natural = max(length / mean if mean > 0 else 0.0, plates)
     force = max(min(largest, natural), DUST * natural) if natural > 0 else largest
     force = force or 1.0  # no force, and none that would make a displacement: any number serves
     if length == 0:

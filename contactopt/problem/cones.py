@@ -124,15 +124,15 @@ def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.n
         The nearest points and the derivative.
     """
     k, d = y.shape
+    if d == 1:
+        bound = np.broadcast_to(radius, (k,))[:, None]
+        return np.minimum(np.maximum(y, -bound), bound), (np.abs(y) <= bound).astype(float)[:, :, None]
     length = np.linalg.norm(y, axis=1)
     outside = length > radius
     unit = np.divide(y, length[:, None], out=np.zeros_like(y), where=length[:, None] > 0)
     D = np.broadcast_to(np.eye(d), (k, d, d)).copy()
-    if d == 1:
-        D[outside] = 0.0
-    else:
-        shrink = np.divide(radius, length, out=np.ones_like(length), where=outside)
-        D[outside] = shrink[outside, None, None] * (D - unit[:, :, None] * unit[:, None, :])[outside]
+    shrink = np.divide(radius, length, out=np.ones_like(length), where=outside)
+    D[outside] = shrink[outside, None, None] * (D - unit[:, :, None] * unit[:, None, :])[outside]
     return disc(y, radius), D
 
 

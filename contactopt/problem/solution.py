@@ -19,7 +19,7 @@ class Status(Enum):
     SETTLED = "settled", "the method ended by its own criterion, but the certificate is above the tolerance"
     ITERATION_LIMIT = "iteration_limit", "the iterations ran out with the certificate above the tolerance"
     TIME_LIMIT = "time_limit", "the time ran out with the certificate above the tolerance"
-    CYCLING = "cycling", "the iteration came back to an earlier state, so it cannot converge; try relaxation"
+    CYCLING = "cycling", "the iteration came back to an earlier state, so it does not converge"
     STALLED = "stalled", "the iterate no longer changes, but the certificate is above the tolerance"
     DIVERGED = "diverged", "the iterates grew without bound; the last finite one is kept"
     INFEASIBLE = "infeasible", "the problem has no solution, and a ray proves it"

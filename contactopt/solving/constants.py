@@ -15,6 +15,9 @@ PROGRESS = 0.9  # a residual that falls by less than this factor is no progress
 CONE_PROGRAMS = 5  # of the fixed point of Acary and Cadoux
 CLOSE = 1e-3  # error of an interior point from which the proximal loop finds the last digits
 LEAST_ALPHA = 1e-4  # weight with which it begins there
+NEARBY = (
+    1.0  # residual of Newton's best point, over its forces, up to which the proximal loop goes on from there at once
+)
 POLISH = 10  # proximal steps for the last digits, each so many of which must halve the residual
 ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
 SPARSE_ROUND = 100  # of the first of a sparse Q, where random forces lead nowhere

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -26,7 +26,7 @@ from contactopt.problem.certificate import Moved
 from contactopt.problem.operators import InterfaceOperator, diagonal, loosened
 from contactopt.problem.stacked import Stacked
 from contactopt.solving.deadline import TimeUp, until
-from contactopt.solving.methods import Iterate, Known, Method, default_method, find_method, solvers_of, solves
+from contactopt.solving.methods import Iterate, Known, Method, Repeated, default_method, find_method, solvers_of, solves
 from contactopt.solving.notes import collected
 
 CYCLE = 12  # longest cycle that is looked for
@@ -134,14 +134,18 @@ def _run(
     operator = scaled.Q if isinstance(scaled.Q, InterfaceOperator) else None
     steps = method.iterate(scaled, None if start is None else _dimensionless_start(start, problem, scales))
     ended: Status | None = None
+    repeated: Status | None = None
     message = ""
     proof, doubt = None, DOUBT
     while ended is None and proof is None:
         begin = time.perf_counter()
-        iterate, ended, message = _next(steps, recorder.left())
+        iterate, ended, message = _next(steps, recorder.left(), repeated)
         recorder.clock += time.perf_counter() - begin
+        repeated = None
         if iterate is not None:
             ended = recorder.record(iterate, _counts(operator))
+        if iterate is not None and ended in (Status.STALLED, Status.CYCLING):
+            ended, repeated = None, ended
         if ended is None and recorder.residual > FAR and recorder.clock > doubt:
             proof, doubt = infeasibility(problem, recorder.clock / 10), 10 * recorder.clock
     status = Status.SOLVED if recorder.residual <= tol else ended or Status.INFEASIBLE
@@ -164,11 +168,16 @@ def _run(
     )
 
 
-def _next(steps: Iterator[Iterate | Known], left: float) -> tuple[Iterate | Known | None, Status | None, str]:
-    """The next iterate of a method with `left` seconds to go; without one, how the iteration ended and why."""
+def _next(
+    steps: Iterator[Iterate | Known], left: float, repeated: Status | None
+) -> tuple[Iterate | Known | None, Status | None, str]:
+    """The next iterate of a method with `left` seconds to go; without one, how the iteration ended and why.
+
+    repeated  how the last iterates repeat earlier ones; a method that does not go on in another way ends so
+    """
     try:
         with np.errstate(all="ignore"), until(time.perf_counter() + left):  # what overflows is seen below
-            iterate = next(steps, None)
+            iterate = next(steps, None) if repeated is None else _turned(steps)
     except TimeUp:
         return None, Status.TIME_LIMIT, ""
     except BackendError as error:
@@ -176,10 +185,18 @@ def _next(steps: Iterator[Iterate | Known], left: float) -> tuple[Iterate | Know
     except np.linalg.LinAlgError as error:
         return None, Status.BACKEND_FAILED, f"the method broke down in its linear algebra: {error}"
     if iterate is None:
-        return None, Status.SETTLED, ""
+        return None, repeated or Status.SETTLED, ""
     if not all(np.all(np.isfinite(part)) for part in iterate[:2]):
         return None, Status.DIVERGED, ""
     return iterate, None, ""
+
+
+def _turned(steps: Iterator[Iterate | Known]) -> Iterate | Known | None:
+    """The next iterate of a method that was told that it repeats itself; None where it has no other way to go on."""
+    try:
+        return steps.throw(Repeated()) if isinstance(steps, Generator) else None
+    except (Repeated, StopIteration):
+        return None
 
 
 def _counts(operator: InterfaceOperator | None) -> dict[str, float]:

@@ -66,8 +66,23 @@ def factorise(A: sp.csc_matrix) -> Any:
     -------
     SuperLU
         The factors, an object of SciPy.
+
+    Raises
+    ------
+    MemoryError
+        If the factors do not fit, with a sentence.
+    RuntimeError
+        If A is singular.
     """
-    return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    try:
+        return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except (MemoryError, RuntimeError) as error:
+        if "singular" in str(error):
+            raise
+        raise MemoryError(
+            f"the factors of a body of {A.shape[0]:,} unknowns do not fit into memory; take a coarser mesh, or the "
+            "solver 'multigrid'."
+        ) from error
 
 
 class SuperLUSolver:

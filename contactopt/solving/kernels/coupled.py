@@ -17,7 +17,7 @@ Wathen (2000), A note on preconditioning for indefinite linear systems.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -42,6 +42,7 @@ from contactopt.solving.kernels.alart_curnier import (
     glued_contacts,
     glued_projection,
 )
+from contactopt.solving.kernels.balance import loose_motions, settled
 from contactopt.solving.kernels.flexible import flexible_gmres
 from contactopt.solving.kernels.krylov import model_of
 from contactopt.solving.kernels.linearised import Linearised
@@ -76,11 +77,15 @@ class Coupled:
         r = np.repeat(self.equations.rho**-0.5, self.equations.q.shape[1])
         return _joined(self.form.diagonal() ** -0.5, r, np.ones(len(self.equations.s)))
 
+    def moved(self, at: State) -> np.ndarray:
+        """The relative displacements u (k, d)."""
+        u = self.form.moved(at.X, at.r.ravel()) + self.equations.V @ at.multipliers
+        return np.asarray(u.reshape(at.r.shape) + self.equations.q)
+
     def linearised(self, at: State) -> tuple[Stacked, Linearised]:
         """The right side of Newton's step there, in parts for X, r and the balance, and its contact equations."""
         equations = self.equations
-        u = (self.form.moved(at.X, at.r.ravel()) + equations.V @ at.multipliers).reshape(at.r.shape) + equations.q
-        P, D = equations.project(at.r - equations.rho[:, None] * u)
+        P, D = equations.project(at.r - equations.rho[:, None] * self.moved(at))
         balance = equations.V.T @ at.r.ravel() + equations.s
         forces = self.form.unbalanced(at.X, at.r.ravel())
         return _joined(forces, (P - at.r).ravel(), -balance), Linearised(equations, D)
@@ -162,6 +167,11 @@ def coupled_steps(
     while at is not None:
         with one_blas_thread():
             right, linearised = coupled.linearised(at)
+            loose = loose_motions(problem.V, linearised.D)
+            change = settled(equations, problem.law, at.r, coupled.moved(at), loose) if loose.size else None
+            if change is not None:
+                at = replace(at, multipliers=at.multipliers + change)
+                right, linearised = coupled.linearised(at)
             residual = coupled.size(right)
             error = _parted(right)[1].reshape(at.r.shape)
             known = coupled.judged(at, admissible(problem, at.r, error) - at.r)

@@ -301,7 +301,10 @@ def _symmetric(
     aim, p, count = rtol**2 * abs(gamma), z, 0
     while count < ITERATIONS and gamma > aim:
         product = act(p.reshape(c, m)).ravel().astype(float)
-        alpha = gamma / float(p @ product)
+        work = float(p @ product)
+        if not work > 0:  # forces that move nothing
+            break
+        alpha = gamma / work
         x = x + alpha * p
         residual = residual - alpha * product
         z = projected(residual)

@@ -19,6 +19,7 @@ from contactopt.solving.kernels.semismooth import Equations
 from contactopt.solving.preconditioners import Preconditioner
 
 RESTART, CYCLES = 60, 3  # of GMRES
+UNFELT = 1e-12  # share of the largest force that a motion makes, below which it makes none
 
 Act = Callable[[np.ndarray], np.ndarray]
 
@@ -94,10 +95,12 @@ class Linearised:
             y[inside] = (P @ full)[unknowns]
             return y
 
-        # The border of the balance: K is the inverse of V' N (rho V), the Schur complement for the rough inverse N.
-        border = rho[:, None] * V * inside[:, None]
+        # The border of the balance: K is the inverse of V' N (D rho V), the Schur complement for the rough inverse N.
+        # Motions that no contact feels stay out of it.
+        shifts = (rho[:, None] * V).reshape(n // d, d, p)
+        border = (self.D[np.any(self.D != 0, axis=(1, 2))] @ shifts).reshape(n, p)
         Y = np.stack([apply(v) for v in border.T], axis=1) if p else V
-        K = np.linalg.pinv(V.T @ Y)
+        K = np.linalg.pinv(V.T @ Y, rcond=UNFELT)
 
         def solve(x: np.ndarray) -> np.ndarray:
             # First without multipliers, then the multipliers that restore the balance, then their share of dr.

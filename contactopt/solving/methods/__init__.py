@@ -27,6 +27,13 @@ Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
 Known = tuple[np.ndarray, np.ndarray, Moved]  # the same, and Q r
 
 
+class Repeated(Exception):
+    """Thrown by the driver into `iterate` where it yields, because its iterates come back to earlier ones.
+
+    A method that has another way to go on catches it. All others end.
+    """
+
+
 class Method(Protocol):
     """What every method offers, as the head of this module says."""
 

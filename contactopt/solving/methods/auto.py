@@ -2,7 +2,8 @@
 
 0. Where Q is a convolution, as of half-spaces: Newton's method on nested grids, while its residual falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no force at all) while its residual
-   falls. Elastic bodies end here (reports/newton_steps), each step one dense linear system.
+   falls. Elastic bodies end here (reports/newton_steps), each step one dense linear system. Where its sortings go round in
+   a circle near a solution, a few proximal steps from the best of its points break out of it.
 2. The interior-point method (contactopt.solving.kernels.interior), which no cycle and no rank deficiency of Q disturbs,
    and a few steps of the proximal loop for the last digits. They need no symmetric Q and no backend.
    Where these fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
@@ -21,9 +22,9 @@ may have none.
 from __future__ import annotations
 
 import logging
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
-from itertools import count, islice
+from itertools import count
 from typing import ClassVar
 
 import numpy as np
@@ -40,6 +41,7 @@ from contactopt.solving.constants import (
     GENTLE_ALPHA,
     LARGER,
     LEAST_ALPHA,
+    NEARBY,
     NEWTON_STEPS,
     PATHS,
     PATIENCE,
@@ -53,13 +55,15 @@ from contactopt.solving.kernels.alart_curnier import cold_start, coulomb_equatio
 from contactopt.solving.kernels.homotopy import homotopy_iterates
 from contactopt.solving.kernels.interior import Path, interior_iterates
 from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix
-from contactopt.solving.methods import NATIVE, Iterate, Known
+from contactopt.solving.methods import NATIVE, Iterate, Known, Repeated
 from contactopt.solving.methods.newton import Newton
 from contactopt.solving.methods.proximal import Proximal, proximal_equations, proximal_iterates
 from contactopt.solving.notes import note
 from contactopt.solving.preconditioners import find_preconditioner
 
 logger = logging.getLogger(__name__)
+
+SAME = 1e-6  # relative difference of two residuals of a stage that goes round in a circle
 
 
 @dataclass(frozen=True)
@@ -109,6 +113,10 @@ class Auto:
         matrix = block_matrix(problem.Q, problem.dim)
         if start is not None and sp.issparse(problem.Q):
             reached = yield from self._proximal(problem, matrix, start, POLISH, LEAST_ALPHA)
+        elif not sp.issparse(problem.Q):
+            residual = coulomb_equations(problem).evaluate(*reached)[0]
+            if residual <= NEARBY * np.linalg.norm(reached[0]):
+                reached = yield from self._proximal(problem, matrix, reached, 1, LEAST_ALPHA, aim=residual / 2)
         interior = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         if interior:
             for full in (True, False):
@@ -135,7 +143,7 @@ class Auto:
             note(logger, "the proximal loop got nowhere and started again from random forces")
 
     @staticmethod
-    def _jammed(problem: InterfaceProblem, matrix: Blocks, reached: Iterate) -> Generator[Iterate, None, None]:
+    def _jammed(problem: InterfaceProblem, matrix: Blocks, reached: Iterate) -> Generator[Iterate | Known, None, None]:
         """Without end: paths drawn at random, and the gentle proximal loop from the best point so far."""
         from contactopt.solving.methods.cone import AcaryCadoux
 
@@ -154,19 +162,13 @@ class Auto:
             note(logger, "the proximal loop got nowhere and goes on from the best point, by other paths to begin with")
 
     @staticmethod
-    def _nested(problem: InterfaceProblem, start: Iterate | None) -> Generator[Iterate, None, Iterate | None]:
+    def _nested(problem: InterfaceProblem, start: Iterate | None) -> Generator[Iterate | Known, None, Iterate | None]:
         """Iterates of the nested method while they change for the better; returns the best."""
         from contactopt.solving.methods.nested import Nested
 
-        best, reached, since = np.inf, start, 0
-        for point, residual in Nested().steps(problem, start):
-            yield point
-            since = 0 if residual < PROGRESS * best else since + 1
-            if residual < best:
-                best, reached = residual, point
-            if since >= PATIENCE:
-                break
-        return reached
+        points = Nested().steps(problem, start)
+        reached, _ = yield from _followed(points, lambda steps, since: since >= PATIENCE)
+        return reached or start
 
     @staticmethod
     def _newton(
@@ -180,59 +182,51 @@ class Auto:
         A start that leads nowhere is given up for the solution of the bonded problem, from which Newton's method begins
         where it has none.
         """
-        best, reached = np.inf, start
         operator = problem.Q if isinstance(problem.Q, InterfaceOperator) else None
-        for begin in (start, None) if start is not None else (None,):
-            least, since = np.inf, 0
-            for steps, (point, residual) in enumerate(Newton(preconditioner=preconditioner).steps(problem, begin)):
-                yield point
-                since = 0 if residual < PROGRESS * least else since + 1
-                least = min(least, residual)
-                if residual < best:
-                    best, reached = residual, point[:2]
-                tired = since >= PATIENCE or steps >= NEWTON_STEPS
-                dear = (
-                    operator is not None
-                    and (operator.coupled is not None or problem.q.size > FEW_ENTRIES)
-                    and operator.products < problem.q.size
-                )
-                if tired and (begin is not None or not dear):
-                    break
-            if begin is not None:
-                note(logger, "Newton's method made no progress from the given start and begins anew without it")
-        return reached or cold_start(problem)
+
+        def tired(steps: int, since: int) -> bool:
+            dear = (
+                operator is not None
+                and (operator.coupled is not None or problem.q.size > FEW_ENTRIES)
+                and operator.products < problem.q.size
+            )
+            return (since >= PATIENCE or steps > NEWTON_STEPS) and not dear
+
+        method, warm, least = Newton(preconditioner=preconditioner), start, np.inf
+        if start is not None:
+            first = lambda steps, since: since >= PATIENCE or steps > NEWTON_STEPS  # noqa: E731
+            found, least = yield from _followed(method.steps(problem, start), first)
+            warm = found or start
+            note(logger, "Newton's method made no progress from the given start and begins anew without it")
+        found, residual = yield from _followed(method.steps(problem, None), tired)
+        return (found if residual < least else warm) or cold_start(problem)
 
     @staticmethod
-    def _cones(problem: InterfaceProblem, start: Iterate) -> Generator[Iterate, None, Iterate]:
+    def _cones(problem: InterfaceProblem, start: Iterate) -> Generator[Iterate | Known, None, Iterate]:
         """A few cone programs; returns the best point, `start` if there was none better."""
         from contactopt.solving.methods.cone import AcaryCadoux
 
         if not AcaryCadoux().solves(problem.law):
             return start
-        equations = coulomb_equations(problem)
-        best, reached = equations.evaluate(*start)[0], start
+        evaluate = coulomb_equations(problem).evaluate
+        points = ((point, evaluate(*point)[0]) for point in AcaryCadoux().iterate(problem))
         try:
-            for point in islice(AcaryCadoux().iterate(problem), CONE_PROGRAMS):
-                yield point
-                residual = equations.evaluate(*point)[0]
-                best, reached = min((best, reached), (residual, point), key=lambda pair: pair[0])
+            found, residual = yield from _followed(points, lambda steps, since: steps >= CONE_PROGRAMS)
         except BackendError as error:  # no answer: the proximal loop needs none
             note(logger, f"the cone programs of the default method gave no answer: {error}")
-        return reached
+            return start
+        return found if found is not None and residual < evaluate(*start)[0] else start
 
     @staticmethod
     def _interior(
         problem: InterfaceProblem, matrix: Blocks, start: Iterate, points: Iterator[tuple[Iterate, float]]
-    ) -> Generator[Iterate, None, Iterate]:
+    ) -> Generator[Iterate | Known, None, Iterate]:
         """Points with their errors and, where they came near to a solution, a few proximal steps for the last digits.
 
         Returns the last point or a better `start`.
         """
-        best, reached = np.inf, start
-        for point, error in points:
-            yield point
-            if error < best:
-                best, reached = error, point
+        found, best = yield from _followed(points, lambda steps, since: False)
+        reached = found or start
         if best < CLOSE:
             alpha = max(LEAST_ALPHA, 100 * best)
             reached = yield from Auto._proximal(problem, matrix, reached, POLISH, alpha)
@@ -241,13 +235,25 @@ class Auto:
 
     @staticmethod
     def _proximal(
-        problem: InterfaceProblem, matrix: Blocks, start: Iterate, patience: int, alpha: float, gentle: bool = False
-    ) -> Generator[Iterate, None, Iterate]:
-        """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last."""
+        problem: InterfaceProblem,
+        matrix: Blocks,
+        start: Iterate,
+        patience: int,
+        alpha: float,
+        gentle: bool = False,
+        aim: float = np.inf,
+    ) -> Generator[Iterate | Known, None, Iterate]:
+        """Iterates of the proximal loop while each `patience` of them halve the residual; returns the last.
+
+        aim  residual that the first of these rounds must reach
+        """
         equations = proximal_equations(problem, matrix)
-        best, target, point = np.inf, np.inf, start
+        best, target, point = np.inf, aim, start
         for done, point in enumerate(proximal_iterates(equations, start, alpha, gentle), start=1):
-            yield point
+            try:
+                yield point
+            except Repeated:
+                break
             best = min(best, equations.evaluate(*point)[0])
             if done % patience == 0:
                 if best > target:
@@ -256,3 +262,25 @@ class Auto:
         if point is start:  # not a single subproblem could be solved from there
             yield point
         return point
+
+
+def _followed(
+    points: Iterator[tuple[Iterate | Known, float]], tired: Callable[[int, int], bool]
+) -> Generator[Iterate | Known, None, tuple[Iterate | None, float]]:
+    """Hand points on until a stage is tired or repeats itself; returns the best point and its residual.
+
+    tired  of the number of points so far, and of how many of them came since the last progress
+    """
+    best, reached, since, seen = np.inf, None, 0, np.zeros(0)
+    for steps, (point, residual) in enumerate(points, start=1):
+        try:
+            yield point
+        except Repeated:
+            break
+        since = 0 if residual < PROGRESS * best else since + 1
+        if residual < best:
+            best, reached = residual, point[:2]
+        if tired(steps, since) or np.any(np.abs(seen - residual) <= SAME * residual):
+            break
+        seen = np.append(seen, residual)
+    return reached, best

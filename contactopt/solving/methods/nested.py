@@ -147,9 +147,9 @@ def _solve_level(level: Level, point: Point, enough: float = COARSE_ENOUGH) -> t
 
 def _worth(residual: float, last: float) -> float:
     """Relative accuracy of a step: little while the residual does not fall, because the contacts still change."""
-    return (
-        min(NESTED_LOOSEST, max(NESTED_TIGHTEST, 0.5 * (residual / last) ** 2)) if np.isfinite(last) else NESTED_LOOSEST
-    )
+    if last in (0.0, np.inf):
+        return NESTED_LOOSEST
+    return min(NESTED_LOOSEST, max(NESTED_TIGHTEST, 0.5 * (residual / last) ** 2))
 
 
 def _whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:

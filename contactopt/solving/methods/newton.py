@@ -6,7 +6,8 @@ sorts the contacts into open, sticking and slipping and solves one linear system
 the step is worth (Eisenstat, Walker 1996), some ten products with Q each (contactopt.solving.kernels.krylov). Where the
 bodies themselves are solved by iteration, one iteration sees contacts and bodies at once
 (contactopt.solving.kernels.coupled). Full steps from the bonded solution; the number of steps hardly depends on the mesh
-(reports/newton_steps). Not globally convergent: rank-deficient Q (rigid bodies, redundant contacts) or strong
+(reports/newton_steps). Motions that friction alone holds, and no sticking contact, follow from a convex problem before each
+step (contactopt.solving.kernels.balance). Not globally convergent: rank-deficient Q (rigid bodies, redundant contacts) or strong
 friction may make it cycle, which is what `proximal` is for.
 Sources: Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual active set algorithm for
 three-dimensional contact problems with Coulomb friction.
@@ -35,6 +36,7 @@ from contactopt.solving.kernels.alart_curnier import (
     krylov,
     sparse,
 )
+from contactopt.solving.kernels.balance import loose_motions, settled
 from contactopt.solving.kernels.coupled import coupled_steps
 from contactopt.solving.kernels.krylov import model_of
 from contactopt.solving.methods import NATIVE, Iterate, Known
@@ -121,10 +123,17 @@ class Newton:
             aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
             sharp = replace(equations, Q=loosened(problem.Q, SHARP * aim))
             residual, error, balance, D = sharp.evaluate(r, multipliers)
+            loose = loose_motions(problem.V, D)
+            if loose.size:
+                u = (sharp.Q @ r.ravel() + problem.V @ multipliers).reshape(r.shape) + problem.q
+                change = settled(sharp, problem.law, r, u, loose)
+                if change is not None:
+                    multipliers = multipliers + change
+                    residual, error, balance, D = sharp.evaluate(r, multipliers)
             yield (admissible(problem, r, error) if implicit else r + error, multipliers), residual
             rtol = forcing(residual, last)
-            change = step(sharp, error, balance, D, rtol)
-            if change is None:
+            moved = step(sharp, error, balance, D, rtol)
+            if moved is None:
                 note(logger, UNSOLVED)
                 return
-            r, multipliers, last = r + change[0], multipliers + change[1], residual
+            r, multipliers, last = r + moved[0], multipliers + moved[1], residual

@@ -276,8 +276,14 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
 
 
 def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Z (n, j) with Z'QZ = I on the same columns, but for what rounding makes of those that depend on others, and QZ."""
-    size = np.sqrt(np.maximum(np.einsum("ij,ij->j", Z, QZ), 1e-300))
+    """Z (n, j) with Z'QZ = I on the same columns, but for what rounding makes of those that depend on others, and QZ.
+
+    Forces that move nothing, as those that are constant on a periodic half-space, have no energy and are left out.
+    """
+    energy = np.einsum("ij,ij->j", Z, QZ)
+    each = energy / np.maximum(np.einsum("ij,ij->j", Z, Z), 1e-300)
+    acts = each > DEPENDENT * each.max(initial=0.0)
+    Z, QZ, size = Z[:, acts], QZ[:, acts], np.sqrt(energy[acts])
     values, vectors = np.linalg.eigh((Z.T @ QZ / size).T / size)
     kept = values > DEPENDENT
     change = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
