@@ -20,7 +20,7 @@ if __name__ == "__main__":
     logging.disable(logging.WARNING)
     first, last = map(int, sys.argv[1:3])
     for seed in range(first, last):
-        begin = time.perf_counter()
+        begin = time.process_time()
         name = list(FAMILIES)[seed % len(FAMILIES)]
         verdict = judge(seed, FAMILIES[name](np.random.default_rng(seed)))
-        print(seed, verdict.family, f"{time.perf_counter()-begin:.1f} s", f"{np.median(verdict.widths or [0]):.1e}", *verdict.wrong, sep="\n   " if verdict.wrong else " ", flush=True)
+        print(seed, verdict.family, f"{time.process_time()-begin:.1f} s", f"{np.median(verdict.widths or [0]):.1e}", *verdict.wrong, sep="\n   " if verdict.wrong else " ", flush=True)

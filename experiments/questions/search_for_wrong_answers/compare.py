@@ -165,18 +165,8 @@ class Verdict:
     widths: tuple[float, ...] = ()
 
 
-def judge(seed: int, case: Case) -> Verdict:
-    """Compare the two ways of a case, and the second with itself where it is not moved."""
-    levels: list[list[Values]] = []
-    try:
-        for way in case.ways:
-            levels.append([way] if isinstance(way, dict) else [read(way, level, case) for level in LEVELS])
-        way = case.ways[1]
-        bent = any(isinstance(part, HalfSpace) for part in way.build(0).bodies) and way.swapped
-        still = read(way, LEVELS[0], case, moved=False) if way.move is not None and not bent else levels[1][0]
-    except Exception as failure:  # whatever stops a scene is what is looked for
-        where = traceback.extract_tb(failure.__traceback__)[-1]
-        return Verdict(seed, case.family, (f"{type(failure).__name__} at {where.name}: {str(failure)[:160]}",))
+def compared(case: Case, levels: list[list[Values]]) -> tuple[list[str], list[float]]:
+    """What the two ways disagree on beyond the errors of their last three levels, and the widths of all estimates."""
     wrong, widths = [], []
     everything = [own for way in levels for own in way]
     for name in levels[0][0].keys() & levels[1][0].keys():
@@ -184,20 +174,48 @@ def judge(seed: int, case: Case) -> Verdict:
             continue
         scale = scale_of(name, everything)
         rows = [np.array([own[name] for own in way]) for way in levels]
-        width = sum(error(row) for row in rows)
+        width, apart = sum(error(row) for row in rows), abs(rows[0][-1] - rows[1][-1])
         widths.append(float(width / scale))
-        apart = abs(rows[0][-1] - rows[1][-1])
         loose = case.loose if name.split()[0] in ("centre", "reach") else 0.0
         if not apart <= width + (ROUNDING + case.strain) * scale + loose:
             told = " | ".join(" ".join(f"{value:.5g}" for value in row) for row in rows)
             wrong.append(f"{name}: {told}; apart {apart / scale:.1e}, levels {width / scale:.1e}")
-    for name, value in still.items():
-        scale = scale_of(name, [still, *everything])
-        if name.split()[0] == "peak":  # of a pressure that is all but even, the fit lies about any of its nodes
-            continue
-        if not abs(value - levels[1][0][name]) <= SHARP * scale:
-            wrong.append(f"{name} moved: {value:.8g} becomes {levels[1][0][name]:.8g}")
+    return wrong, widths
+
+
+def judge(seed: int, case: Case) -> Verdict:
+    """Compare the two ways of a case, and the second with itself where it is not moved.
+
+    Where they disagree, both are refined once more: then the coarsest level was too coarse for an estimate, or they disagree.
+    """
+    levels: list[list[Values]] = []
+    try:
+        for way in case.ways:
+            levels.append([way] if isinstance(way, dict) else [read(way, level, case) for level in LEVELS])
+        wrong, widths = compared(case, levels)
+        if wrong:
+            finer = LEVELS[-1] + 1
+            for i, way in enumerate(case.ways):
+                levels[i] = [way] if isinstance(way, dict) else [*levels[i][1:], read(way, finer, case)]
+            wrong, widths = compared(case, levels)
+        way = case.ways[1]
+        bent = way.swapped and any(isinstance(part, HalfSpace) for part in way.build(0).bodies)
+        if way.move is not None and not bent:
+            wrong += unmoved(case, way)
+    except Exception as failure:  # whatever stops a scene is what is looked for
+        where = traceback.extract_tb(failure.__traceback__)[-1]
+        return Verdict(seed, case.family, (f"{type(failure).__name__} at {where.name}: {str(failure)[:160]}",))
     return Verdict(seed, case.family, tuple(sorted(wrong)), tuple(widths))
+
+
+def unmoved(case: Case, way: Way) -> list[str]:
+    """What changes when a way is not moved. The peak of a pressure that is all but even lies about any of its nodes."""
+    still, moved = read(way, LEVELS[0], case, moved=False), read(way, LEVELS[0], case)
+    return [
+        f"{name} moved: {still[name]:.8g} becomes {moved[name]:.8g}"
+        for name in still
+        if name.split()[0] != "peak" and not abs(still[name] - moved[name]) <= SHARP * scale_of(name, [still, moved])
+    ]
 
 
 def scene_of(bodies: list[Any], contacts: list[tuple[str, str]], mu: float, **settings: Any) -> Scene:

@@ -10,6 +10,7 @@ import numpy as np
 
 from contactopt import BodyForce, HalfSpace, Material, Part, Plate, Rigid, Scene, Support, Traction
 from contactopt.analytic import contact_modulus, hertz_line, hertz_point, press_fit
+from contactopt.scenes.round import cylinder
 from contactopt.scenes.discs import half_disc
 from contactopt.scenes.meshes import graded, simplices, tensor_mesh
 from experiments.questions.search_for_wrong_answers.compare import Case, Values, Way, scene_of
@@ -86,7 +87,8 @@ def column(rng: Random, layers: int, thin: bool) -> tuple[list[Any], list[Any], 
         wide = (right - left) * float(1.0 if rng.random() < 0.3 else rng.uniform(0.5, 0.95))
         start = left + float(rng.uniform(0, 1)) * (right - left - wide)
         patches.append((start, start + wide))
-        left, right, y = start, start + wide, y + height
+        apart = float(rng.uniform(0.01, 0.3)) if rng.random() < 0.3 else 0.0
+        left, right, y = start, start + wide, y + height + apart
     return bodies, patches[:-1], [(low[0], low[1])]
 
 
@@ -614,6 +616,49 @@ def boxes(rng: Random) -> Case:
     return Case("box on box", (a, replace(b, axes=(0, 1, 2))), points)
 
 
+def roller(rng: Random) -> Case:
+    """A cylinder on a flat body: half of it graded around the contact, or all of it by Gmsh, coarse where it is far apart."""
+    one, two, mu = material(rng), material(rng), friction(rng)
+    a, wide, high = float(rng.uniform(0.03, 0.1)), float(rng.uniform(1.5, 4)), float(rng.uniform(1, 3))
+    force = np.pi * contact_modulus(one, two) * a**2 / 4
+
+    def half(level: int) -> Scene:
+        return cylinder(
+            radius=1.0, foundation_width=wide, foundation_height=high, depth=1.0, upper=one, lower=two, mu=mu, force=force,
+            elements=6 * 2**level,
+        )  # fmt: skip
+
+    def arc(x: np.ndarray) -> np.ndarray:
+        off = x - np.array([[0.0], [1.0]])
+        return np.array([[0.0], [1.0]]) + off / np.hypot(*off)
+
+    def template(meshes: dict[str, Any], settings: dict[str, Any]) -> Scene:
+        bodies = [
+            Part("cylinder", meshes["cylinder"], one, (), (Plate("straight top", {"y": -force}),), curve={"arc": arc}),
+            Part("foundation", meshes["foundation"], two, (Support("bottom"),)),
+        ]
+        return scene_of(bodies, [("cylinder:arc", "foundation:contact")], mu, **settings)
+
+    fine, coarse = float(rng.uniform(0.8, 1.3)), float(rng.uniform(0.1, 0.5))
+
+    def round_body(level: int) -> Any:
+        h = a / (5 * 2**level) * fine
+        angles = [-np.pi, -np.pi / 2 - 1.3 * a, -np.pi / 2, -np.pi / 2 + 1.3 * a, 0.0]
+        sizes, names = [coarse, h, h, h, coarse], ["arc"] * 4 + ["straight top"]
+        made = outlined([(np.cos(t), np.sin(t), s, n) for t, s, n in zip(angles, sizes, names)], arcs=True)
+        return type(made)(made.doflocs + np.array([[0.0], [1.0]]), made.t).with_boundaries(made.boundaries)
+
+    def flat_body(level: int) -> Any:
+        h, c = a / (5 * 2**level) * fine * 1.2, wide / 2
+        places = [(-c, -high), (c, -high), (c, 0.0), (1.3 * a, 0.0), (-1.3 * a, 0.0), (-c, 0.0)]
+        names = ["bottom", "right", "contact", "contact", "contact", "left"]
+        return outlined([(*x, s, n) for x, s, n in zip(places, [coarse] * 3 + [h, h, coarse], names)])
+
+    second = other_way(rng, template, {"cylinder": round_body, "foundation": flat_body})
+    only = ("energy", "normal", "friction", "pressure", "peak", "reach", "area", "stick", "bearing")
+    return Case("roller", (Way(half), second), whole=False, smooth=True, only=only, loose=a**2, strain=a)
+
+
 FAMILIES: dict[str, Callable[[Random], Case]] = {
     "blocks": stack,
     "three": lambda rng: stack(rng, 3),
@@ -629,4 +674,5 @@ FAMILIES: dict[str, Callable[[Random], Case]] = {
     "large": large_body,
     "ball": ball,
     "boxes": boxes,
+    "roller": roller,
 }
