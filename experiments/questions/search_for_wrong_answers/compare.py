@@ -32,12 +32,14 @@ class Way:
     axes     components of its space that are those of the case
     swapped  whether upper and lower bodies are exchanged before it is solved
     move     how it is moved before it is solved
+    simplest whether all that can be left out is left out before it is solved
     """
 
     build: Callable[[int], Scene]
     axes: tuple[int, ...] = (0, 1)
     swapped: bool = False
     move: Move | None = None
+    simplest: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +82,9 @@ def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
     scene = way.build(level)
     scene = swapped(scene) if way.swapped else scene
     move = way.move if moved and way.move is not None else Move(np.eye(scene.dim))
-    result = run(move.scene(scene) if way.move is not None and moved else scene, tol=TOL, figures=())
+    result = run(move.scene(scene) if way.move is not None and moved else scene, tol=TOL, figures=(), simplest=way.simplest)
+    if result.problem.dim < scene.dim:
+        move = Move(np.eye(result.problem.dim))
     if result.summary["status"] != "solved":
         raise ArithmeticError(f"{result.summary['status']}: {result.summary['message']}")
     L, S, axes, found = move.length, move.stress, list(way.axes), {}
@@ -220,6 +224,6 @@ def unmoved(case: Case, way: Way) -> list[str]:
 
 def scene_of(bodies: list[Any], contacts: list[tuple[str, str]], mu: float, **settings: Any) -> Scene:
     """A scene in the long form, without names that matter."""
-    coupling, carrier = settings.pop("coupling", "auto"), settings.pop("carrier", None)
-    pairs = tuple(Contact(upper, lower, mu, coupling=coupling, carrier=carrier) for upper, lower in contacts)
+    given = {key: settings.pop(key) for key in ("coupling", "carrier", "law") if key in settings}
+    pairs = tuple(Contact(upper, lower, mu, **given) for upper, lower in contacts)
     return Scene("search", bodies=tuple(bodies), contacts=pairs, **settings)

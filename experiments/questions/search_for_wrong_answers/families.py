@@ -75,11 +75,10 @@ def polygon(corners: Any, names: list[str], touching: set[str], extra: dict[str,
 SIDES = ["bottom", "right", "top", "left"]
 
 
-def column(rng: Random, layers: int, thin: bool) -> tuple[list[Any], list[Any], list[tuple[float, float]]]:
-    """Corners of bodies one upon another, the names of their upper sides that touch, and where along them."""
-    low, wide = (0.0, float(rng.uniform(2, 4))), 0.0
-    bodies, patches, y = [], [], 0.0
-    left, right = low
+def column(rng: Random, layers: int, thin: bool) -> tuple[list[Any], list[Any], float]:
+    """Corners of bodies one upon another, where along their upper sides they touch, and the sum of the gaps between them."""
+    bodies, patches, y, gaps = [], [], 0.0, 0.0
+    left, right = 0.0, float(rng.uniform(2, 4))
     for layer in range(layers):
         height = float(rng.uniform(0.5, 1.5) if layer == 0 or not thin or rng.random() < 0.6 else rng.uniform(0.05, 0.2))
         a, b = (rng.uniform(-0.15, 0.15, 2) * (right - left)) if layer == layers - 1 else (0.0, 0.0)
@@ -89,18 +88,20 @@ def column(rng: Random, layers: int, thin: bool) -> tuple[list[Any], list[Any], 
         patches.append((start, start + wide))
         apart = float(rng.uniform(0.01, 0.3)) if rng.random() < 0.3 else 0.0
         left, right, y = start, start + wide, y + height + apart
-    return bodies, patches[:-1], [(low[0], low[1])]
+        gaps += apart if layer < layers - 1 else 0.0
+    return bodies, patches[:-1], gaps
 
 
 def stack(rng: Random, layers: int = 2, solid: bool = False) -> Case:
     """Blocks one upon another, thin ones among them, pressed by a plate, a traction or their weight; or as a slab in space."""
-    corners, patches, _ = column(rng, layers, not solid)
+    corners, patches, gaps = column(rng, layers, not solid)
     names, mu, materials = [f"body {i}" for i in range(layers)], friction(rng), [material(rng) for _ in range(layers)]
     force, lean = float(10 ** rng.uniform(-3, -1)), float(rng.uniform(-0.6, 0.6)) * mu
     top = corners[-1]
     span, depth = top[2][0] - top[3][0], float(rng.uniform(0.3, 1.0)) if solid else 1.0
     flat = abs(lean) * sum(c[2][1] - c[0][1] for c in corners) < 0.2 * min(c[1][0] - c[0][0] for c in corners)
-    kind = rng.choice(["plate", "traction", "weight"]) if mu > 0.1 and flat else "plate"
+    kind = rng.choice(["plate", "traction", "weight", "moved"]) if mu > 0.1 and flat else rng.choice(["plate", "moved"])
+    law = str(rng.choice(["coulomb", "tresca", "tied"], p=[0.8, 0.1, 0.1])) if gaps == 0 and mu else "coulomb"
     load: Any = Plate("top", {"x": lean * force, "y": -force})
     if mu == 0:
         load = Plate("top", {"y": -force})
@@ -109,6 +110,7 @@ def stack(rng: Random, layers: int = 2, solid: bool = False) -> Case:
         load = Traction("top", (lean * force / span / depth, -force / span / depth, *third))
     elif kind == "weight":
         load = BodyForce((lean * force, -force, *third))
+    shift = {"x": lean * 1e-3, "y": -gaps - 1e-3}
     rollers = (Support("near", {"z": 0.0}), Support("far", {"z": 0.0}))
 
     def template(meshes: dict[str, Any], settings: dict[str, Any]) -> Scene:
@@ -116,15 +118,15 @@ def stack(rng: Random, layers: int = 2, solid: bool = False) -> Case:
         bodies = []
         for i, name in enumerate(names):
             held = ((Support("bottom"),) if i == 0 else ()) + (rollers if space else ())
-            own = load if space or kind == "plate" or kind == "weight" and not solid else replace(load, value=load.value[:2])
-            carried = (own,) if i == layers - 1 else ()
+            own = load if space or kind in ("plate", "moved") else replace(load, value=load.value[:2])
+            carried = (own,) if i == layers - 1 and kind != "moved" else ()
+            if i == layers - 1 and kind == "moved":
+                held += (Support("top", {**shift, "z": 0.0} if space else shift),)
             bodies.append(Part(name, meshes[name], materials[i], held, carried))
-        pairs = [
-            (f"{upper}:bottom" if layers > 2 else f"{upper}:bottom", f"{lower}:contact")
-            for lower, upper in zip(names, names[1:])
-        ]
+        pairs = [(f"{upper}:bottom", f"{lower}:contact") for lower, upper in zip(names, names[1:])]
+        settings["law"] = law
         size = {"kind": "solid"} if space else {"thickness": depth}
-        return scene_of(bodies, pairs, mu, **size, **settings)
+        return scene_of(bodies, pairs, mu * force if law == "tresca" else mu, **size, **settings)
 
     finest = min(min(high - low for low, high in patches) / 8, 2 * min(c[2][1] - c[1][1] for c in corners))
 
@@ -169,7 +171,9 @@ def stack(rng: Random, layers: int = 2, solid: bool = False) -> Case:
         for name, body in zip(names, corners)
     }
     family = f"slab of {layers} blocks in space" if solid else f"{layers} blocks"
-    return Case(family, (a, b), points)
+    if solid and rng.random() < 0.3:
+        b = replace(b, move=None, simplest=True)
+    return Case(family, (a, b), points, loose=1.001 * gaps)
 
 
 def crown(rng: Random, kind: str = "plane-strain") -> Case:
@@ -252,9 +256,9 @@ def crown(rng: Random, kind: str = "plane-strain") -> Case:
 def pin(rng: Random) -> Case:
     """A pin with a hole, loaded obliquely, in a bush that is held outside; with or without clearance."""
     hole, outer, mu = float(rng.uniform(0.3, 0.6)), float(rng.uniform(1.6, 2.5)), friction(rng)
-    play = 0.0 if rng.random() < 0.3 else float(10 ** rng.uniform(-4, -2))
+    play = 0.0 if rng.random() < 0.3 else float(10 ** rng.uniform(-4, -1))
     one, two = material(rng), material(rng)
-    angle, force = rng.uniform(0, 2 * np.pi), min(one.E, two.E) * (play or 1e-3) * float(rng.uniform(0.3, 3))
+    angle, force = rng.uniform(0, 2 * np.pi), min(one.E, two.E) * min(play or 1e-3, 1e-3) * float(rng.uniform(0.3, 3))
     load = Plate("inside", {"x": force * np.cos(angle), "y": force * np.sin(angle)})
 
     def circle(r: float) -> Callable[[np.ndarray], np.ndarray]:
@@ -300,7 +304,7 @@ def pin(rng: Random) -> Case:
         own = b.build
         b = replace(b, build=lambda level: replace(own(level), degree=2))
     points = {"pin": [(0.0, (hole + 1) / 2), ((hole + 1) / 2, 0.0)], "bush": [(0.0, -(1 + outer) / 2)]}
-    return Case("pin in bush", (a, b), points, smooth=True, loose=play, strain=play)
+    return Case("pin in bush", (a, b), points, smooth=True, loose=play, strain=1e-3)
 
 
 def wedge(rng: Random) -> Case:
@@ -396,11 +400,16 @@ def floor(rng: Random) -> Case:
     phase, sizes = rng.uniform(0, 2 * np.pi, 3), rng.uniform(0.2, 1, 3)
     force = own.E * depth * float(10 ** rng.uniform(-0.7, 0.7))
     load = {"y": -force} if mu == 0 else {"x": float(rng.uniform(-0.8, 0.8)) * mu * force, "y": -force}
-    lowest = min(0.0, -sizes.sum())
+    pushed = bool(rng.random() < 0.3)
+    lift = {"y": depth * float(rng.uniform(0.2, 2)), "x": 0.0}
+
+    def waved(x: np.ndarray) -> np.ndarray:
+        return np.asarray(sum(a * np.cos(k * np.pi * x / wide + p) for a, k, p in zip(sizes, waves, phase)))
+
+    lowest = waved(np.linspace(0, wide, 1000)).min()
 
     def shape(x: np.ndarray) -> np.ndarray:
-        waved = sum(a * np.cos(k * np.pi * x[0] / wide + p) for a, k, p in zip(sizes, waves, phase))
-        return np.asarray(depth * (waved - lowest))
+        return np.asarray(depth * (waved(x[0]) - lowest))
 
     def raised(mesh: Any) -> Any:
         p = mesh.doflocs.copy()
@@ -410,10 +419,15 @@ def floor(rng: Random) -> Case:
     corners, normal = [(0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high)], (0.0, 1.0)
 
     def template(meshes: dict[str, Any], settings: dict[str, Any], gap: Any = lambda x: x[1]) -> Scene:
-        block = Part("block", meshes["block"], own, (), (Plate("top", load),))
+        block, ground = Part("block", meshes["block"], own, (), (Plate("top", load),)), Rigid("floor", normal, gap)
+        moved = "coupling" in settings  # the second way moves the block, the first the floor, where no force is given
+        if pushed:
+            down = {name: -value for name, value in lift.items()} if moved else None
+            block = replace(block, loads=(), supports=(Support("top", down),))
+            ground = ground if moved else replace(ground, displacement=lift)
         for key in ("coupling", "carrier"):
             settings.pop(key, None)
-        return scene_of([block, Rigid("floor", normal, gap)], [("block:bottom", "floor")], mu, **settings)
+        return scene_of([block, ground], [("block:bottom", "floor")], mu, **settings)
 
     def structured(level: int) -> Any:
         h = wide / (20 * 2**level)
@@ -423,7 +437,9 @@ def floor(rng: Random) -> Case:
     first = first_way(rng, lambda meshes, settings: template(meshes, settings, shape), {"block": structured})
     second = other_way(rng, template, {"block": lambda level: raised(free(wide / (20 * 2**level) * share))})
     points = {"block": [(0.4 * wide, 0.5 * high), (0.7 * wide, 0.3 * high)]}
-    return Case("uneven block on a floor", (first, second), points, loose=2 * depth * sizes.sum(), strain=10 * depth / wide)
+    only = ("energy", "normal", "force", "friction", "bearing", "reach", "stick", "area", "centre", "von_mises", "mean_stress")
+    only += () if pushed else ("moved",)
+    return Case("uneven block on a floor", (first, second), points, only=only, loose=2 * depth * sizes.sum(), strain=10 * depth / wide)
 
 
 def exact_half_space(rng: Random) -> Case:
@@ -535,9 +551,9 @@ def ball(rng: Random) -> Case:
 
     def build(level: int, section: bool, share: float = 1.0, degree: int = 1) -> Scene:
         h = a / ((6 * 2**level if section else 3 * 1.4**level) * share)
-        radii = ticks([0.0, wide], h)
         made = []
         for i, height in enumerate(heights):
+            radii = ticks([0.0, wide], h * (1.0 if section or i == 0 else other))
             rise = graded(height, h, 1.3 ** (0.5**level))
             rise = rise if i == 0 else -rise[::-1]
             if section:
@@ -565,6 +581,7 @@ def ball(rng: Random) -> Case:
         kind, copies = ("axisymmetric", 1) if section else ("solid", 2)
         return scene_of(made, [("upper:contact", "lower:contact")], mu, kind=kind, copies=copies, degree=degree)
 
+    other = float(rng.choice([1.0, rng.uniform(0.8, 1.3)]))
     second = Way(lambda level: build(level, False), (0, 2))
     second = replace(second, move=random_move(rng, second.build(0)))
     points = {"upper": [(0.3, 0.5 * heights[0])], "lower": [(0.3, -0.5 * heights[1])]}
@@ -588,12 +605,11 @@ def boxes(rng: Random) -> Case:
             Part("upper", meshes["upper"], one, (), (Plate("z+", load),)),
             Part("lower", meshes["lower"], two, (Support("z-"),)),
         ]
-        settings["degree"] = 1
         return scene_of(bodies, [("upper:z-", "lower:contact")], mu, kind="solid", **settings)
 
     def bricks(name: str, share: float, cut: bool, alike: bool) -> Build:
         def mesh(level: int) -> Any:
-            h = (0.25 if alike else 0.25 * share) / 1.4**level
+            h = (0.25 if alike else 0.35 * share) / 1.4**level
             low, high_, z = (start, start + wide, high[0]) if name == "upper" else (0 * base, base, -high[1])
             marks = [sorted({float(low[i]), float(high_[i]), float(start[i]), float(start[i] + wide[i])}) for i in (0, 1)]
             rows = [ticks(mark, h) for mark in marks]
@@ -659,6 +675,84 @@ def roller(rng: Random) -> Case:
     return Case("roller", (Way(half), second), whole=False, smooth=True, only=only, loose=a**2, strain=a)
 
 
+def heights(rng: Random) -> Case:
+    """A rigid profile on a half-space: as a gap, or as the height of the half-space; smooth or rough, with friction."""
+    solid, periodic, mu, own = rng.random() < 0.4, bool(rng.random() < 0.4), friction(rng), material(rng)
+    count, tall = 4, float(10 ** rng.uniform(-4, -3))
+    k, phase = rng.integers(1, 4, (count, 2)), rng.uniform(0, 2 * np.pi, count)
+    force = contact_modulus(None, own) * tall * float(10 ** rng.uniform(-1, 0.3))
+    push, names = float(rng.uniform(-0.8, 0.8)) * mu * force, "xyz" if solid else "xy"
+    load = {names[-1]: -force} | ({"x": push} if mu else {})
+
+    def gap(x: np.ndarray) -> np.ndarray:
+        waved = sum(np.cos(2 * np.pi * (k[i, 0] * x[0] + (k[i, 1] * x[1] if solid else 0)) + phase[i]) for i in range(count))
+        bent = 0.0 if periodic else 8 * np.sum(x[: 2 if solid else 1] ** 2, axis=0)
+        return np.asarray(tall * (waved + count + bent))
+
+    def build(level: int, high: bool, first: int) -> Scene:
+        n = first * 2**level
+        row = (np.arange(n) + 0.5) / n - 0.5
+        points, kind = ((row, row), "solid") if solid else ((row,), "plane-strain")
+        surface = (lambda x: -gap(x)) if high else None
+        rigid = Rigid("body", gap=None if high else gap, force=load)
+        ground = HalfSpace("ground", own, points, height=surface, periodic=periodic, depth=None if solid else 3.0)
+        return scene_of([rigid, ground], [("body", "ground")], mu, kind=kind)
+
+    first = 10 if solid else 40
+    way = Way(lambda level: build(level, True, first + 3), tuple(range(len(names))), bool(rng.random() < 0.5))
+    way = replace(way, move=random_move(rng, way.build(0), way.swapped))
+    a = Way(lambda level: build(level, False, first), tuple(range(len(names))))
+    return Case("gap or height of a half-space", (a, way), smooth=True, loose=20 * tall)
+
+
+def bridge(rng: Random) -> Case:
+    """A beam on two piers: one surface in two pairs."""
+    mu, materials = friction(rng), [material(rng) for _ in range(3)]
+    long, thick, high = float(rng.uniform(3, 5)), float(rng.uniform(0.3, 1)), float(rng.uniform(0.5, 1.5))
+    feet = [(0.0, float(rng.uniform(0.4, 1))), (long - float(rng.uniform(0.4, 1)), long)]
+    force = 0.003
+    load = {"y": -force} if mu == 0 else {"x": float(rng.uniform(-0.6, 0.6)) * mu * force, "y": -force}
+    shapes = {"beam": [(0.0, high), (long, high), (long, high + thick), (0.0, high + thick)]}
+    shapes |= {
+        name: [(a, 0.0), (b, 0.0), (b, high), (a, high)] for name, (a, b) in zip(("left pier", "right pier"), feet)
+    }
+
+    def template(meshes: dict[str, Any], settings: dict[str, Any]) -> Scene:
+        held = {"left pier": (Support("bottom"),), "right pier": (Support("bottom"),)}
+        bodies = [
+            Part(name, meshes[name], own, held.get(name, ()), () if name in held else (Plate("top", load),))
+            for name, own in zip(shapes, materials)
+        ]
+        pairs = [(f"beam:on {name}", f"{name} pier:top") for name in ("left", "right")]
+        return scene_of(bodies, pairs, mu, **settings)
+
+    def marked(mesh: Any, alike: bool) -> Any:
+        middle = mesh.p[0, mesh.facets].mean(axis=0)
+        bottom = np.asarray(mesh.boundaries["bottom"])
+        own = [bottom[(middle[bottom] > a) & (middle[bottom] < b)] if alike else bottom for a, b in feet]
+        return mesh.with_boundaries({"on left": own[0], "on right": own[1]})
+
+    def structured(name: str) -> Build:
+        def mesh(level: int) -> Any:
+            h, (a, b) = 0.1 / 2**level, (shapes[name][0][0], shapes[name][1][0])
+            x = ticks(sorted({a, b} | {x for foot in feet for x in foot if a < x < b}), h)
+            made = quads(shapes[name], (x - a) / (b - a), ticks([0.0, thick if name == "beam" else high], h))
+            return marked(made, True) if name == "beam" else made
+
+        return mesh
+
+    def free(name: str, share: float) -> Build:
+        corners = shapes[name]
+        extra = {"bottom": [x / long for x in (feet[0][1], feet[1][0])]} if name == "beam" else {}
+        mesh = polygon(corners, SIDES, {"bottom" if name == "beam" else "top"}, extra)
+        return lambda level: (marked(mesh(h), False) if name == "beam" else mesh(h)) if (h := 0.1 / 2**level * share) else None
+
+    a = first_way(rng, template, {name: structured(name) for name in shapes})
+    b = other_way(rng, template, {name: free(name, float(rng.uniform(0.7, 1.2))) for name in shapes})
+    points = {name: [tuple(np.mean(corners, axis=0))] for name, corners in shapes.items()}
+    return Case("beam on two piers", (a, b), points)
+
+
 FAMILIES: dict[str, Callable[[Random], Case]] = {
     "blocks": stack,
     "three": lambda rng: stack(rng, 3),
@@ -675,4 +769,6 @@ FAMILIES: dict[str, Callable[[Random], Case]] = {
     "ball": ball,
     "boxes": boxes,
     "roller": roller,
+    "heights": heights,
+    "bridge": bridge,
 }
