@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt import Contact, HalfSpace, Rigid, Scene, run
+from contactopt import HalfSpace, Rigid, Scene, run
 from contactopt.analysis.quantities import elastic_energy
 from contactopt.analysis.status import contact_status
 from experiments.questions.search_for_wrong_answers.meshes import Move
@@ -49,7 +49,7 @@ class Case:
     points   body -> points of it where stress and displacement are read
     whole    whether both ways model whole bodies, so that forces across planes of symmetry can be compared
     smooth   whether the pressure is finite, so that its peak can be compared
-    only     names of the quantities that both ways have, if not all
+    without  kinds of quantities that the two ways do not share
     loose    how far apart the surfaces are where they touch: places of contact are known to this
     strain   size of the strains and slopes by which the ways differ in geometry
     """
@@ -59,7 +59,7 @@ class Case:
     points: dict[str, list[tuple[float, ...]]] = field(default_factory=dict)
     whole: bool = True
     smooth: bool = False
-    only: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
     loose: float = 0.0
     strain: float = 0.0
 
@@ -67,7 +67,10 @@ class Case:
 def swapped(scene: Scene) -> Scene:
     """The scene with upper and lower exchanged in every pair."""
     other = {"upper": "lower", "lower": "upper", None: None}
-    pairs = tuple(replace(pair, upper=pair.lower, lower=pair.upper, carrier=other[pair.carrier]) for pair in scene.contacts)
+    pairs = tuple(
+        replace(pair, upper=pair.lower, lower=pair.upper, carrier=other[pair.carrier])
+        for pair in scene.contacts
+    )
     return replace(scene, contacts=pairs, bodies=tuple(_turned(part) for part in scene.bodies))
 
 
@@ -82,7 +85,12 @@ def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
     scene = way.build(level)
     scene = swapped(scene) if way.swapped else scene
     move = way.move if moved and way.move is not None else Move(np.eye(scene.dim))
-    result = run(move.scene(scene) if way.move is not None and moved else scene, tol=TOL, figures=(), simplest=way.simplest)
+    result = run(
+        move.scene(scene) if way.move is not None and moved else scene,
+        tol=TOL,
+        figures=(),
+        simplest=way.simplest,
+    )
     if result.problem.dim < scene.dim:
         move = Move(np.eye(result.problem.dim))
     if result.summary["status"] != "solved":
@@ -104,11 +112,14 @@ def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
         found[f"bearing {i}"] = float(np.sum(np.sqrt(n * area)) ** 2 / total)
         if case.smooth:
             found[f"pressure {i}"] = float(np.sum(n[area > 0] ** 2 / area[area > 0]) / total)
-        found[f"reach {i}"] = float(np.sqrt(np.sum(n * np.sum(places[:, own] ** 2, axis=0)) / total))
+        found[f"reach {i}"] = float(
+            np.sqrt(np.sum(n * np.sum(places[:, own] ** 2, axis=0)) / total)
+        )
         found[f"stick {i}"] = float(n[status.stick[own]].sum() / total)
-        found[f"area {i}"] = float(area[~status.open[own]].sum())
         if case.whole:
-            found |= {f"centre {axis} {i}": float(x @ n / total) for axis, x in enumerate(places[:, own])}
+            found |= {
+                f"centre {axis} {i}": float(x @ n / total) for axis, x in enumerate(places[:, own])
+            }
         if case.smooth:
             found[f"peak {i}"] = (result.summary["pressure"] or table["max_pressure"]) / S
     for body in result.fields:
@@ -119,7 +130,9 @@ def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
             values = np.column_stack([moved_by.T, body.von_mises / S, mean / S])
             read_off = fitted(at - np.array(point)[:, None], values)
             names = [f"moved {axis}" for axis in range(len(axes))] + ["von_mises", "mean_stress"]
-            found |= {f"{name} {body.name} {j}": float(value) for name, value in zip(names, read_off)}
+            found |= {
+                f"{name} {body.name} {j}": float(value) for name, value in zip(names, read_off)
+            }
     return found
 
 
@@ -146,7 +159,9 @@ def scale_of(name: str, values: list[Values]) -> float:
     same = groups.get(kind, (name,))
     if kind == "stick":
         return 1.0
-    sizes = [abs(own[key]) for own in values for key in own if key in same or key.split()[0] in same]
+    sizes = [
+        abs(own[key]) for own in values for key in own if key in same or key.split()[0] in same
+    ]
     return max(sizes, default=1.0) or 1.0
 
 
@@ -174,7 +189,7 @@ def compared(case: Case, levels: list[list[Values]]) -> tuple[list[str], list[fl
     wrong, widths = [], []
     everything = [own for way in levels for own in way]
     for name in levels[0][0].keys() & levels[1][0].keys():
-        if case.only and name.split()[0] not in case.only:
+        if name.split()[0] in case.without:
             continue
         scale = scale_of(name, everything)
         rows = [np.array([own[name] for own in way]) for way in levels]
@@ -195,12 +210,16 @@ def judge(seed: int, case: Case) -> Verdict:
     levels: list[list[Values]] = []
     try:
         for way in case.ways:
-            levels.append([way] if isinstance(way, dict) else [read(way, level, case) for level in LEVELS])
+            levels.append(
+                [way] if isinstance(way, dict) else [read(way, level, case) for level in LEVELS]
+            )
         wrong, widths = compared(case, levels)
         if wrong:
             finer = LEVELS[-1] + 1
             for i, way in enumerate(case.ways):
-                levels[i] = [way] if isinstance(way, dict) else [*levels[i][1:], read(way, finer, case)]
+                levels[i] = (
+                    [way] if isinstance(way, dict) else [*levels[i][1:], read(way, finer, case)]
+                )
             wrong, widths = compared(case, levels)
         way = case.ways[1]
         bent = way.swapped and any(isinstance(part, HalfSpace) for part in way.build(0).bodies)
@@ -208,7 +227,9 @@ def judge(seed: int, case: Case) -> Verdict:
             wrong += unmoved(case, way)
     except Exception as failure:  # whatever stops a scene is what is looked for
         where = traceback.extract_tb(failure.__traceback__)[-1]
-        return Verdict(seed, case.family, (f"{type(failure).__name__} at {where.name}: {str(failure)[:160]}",))
+        return Verdict(
+            seed, case.family, (f"{type(failure).__name__} at {where.name}: {str(failure)[:160]}",)
+        )
     return Verdict(seed, case.family, tuple(sorted(wrong)), tuple(widths))
 
 
@@ -218,12 +239,6 @@ def unmoved(case: Case, way: Way) -> list[str]:
     return [
         f"{name} moved: {still[name]:.8g} becomes {moved[name]:.8g}"
         for name in still
-        if name.split()[0] != "peak" and not abs(still[name] - moved[name]) <= SHARP * scale_of(name, [still, moved])
+        if name.split()[0] != "peak"
+        and not abs(still[name] - moved[name]) <= SHARP * scale_of(name, [still, moved])
     ]
-
-
-def scene_of(bodies: list[Any], contacts: list[tuple[str, str]], mu: float, **settings: Any) -> Scene:
-    """A scene in the long form, without names that matter."""
-    given = {key: settings.pop(key) for key in ("coupling", "carrier", "law") if key in settings}
-    pairs = tuple(Contact(upper, lower, mu, **given) for upper, lower in contacts)
-    return Scene("search", bodies=tuple(bodies), contacts=pairs, **settings)

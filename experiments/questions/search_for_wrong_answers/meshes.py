@@ -13,14 +13,17 @@ import numpy as np
 from contactopt import BodyForce, HalfSpace, Part, Plate, Rigid, Scene, load_mesh
 from contactopt.scenes.meshes import tensor_mesh
 
-Corner = tuple[float, float, float, str]  # a corner of an outline, the size of triangles there, the name of the next side
+Corner = tuple[
+    float, float, float, str
+]  # a corner of an outline, the size of triangles there, the name of the next side
 
 
-def ticks(places: list[float], *sizes: float) -> np.ndarray:
-    """A grid through some places; its cells are about as long as given, for all or for each interval."""
+def ticks(places: list[float], size: float) -> np.ndarray:
+    """A grid through some places, whose cells are about as long as given."""
     places = [x for x, after in zip(places, places[1:]) if after - x > 1e-9] + places[-1:]
-    ends = zip(places, places[1:], sizes if len(sizes) == len(places) - 1 else [sizes[0]] * (len(places) - 1))
-    parts = [np.linspace(a, b, max(1, round((b - a) / size)) + 1) for a, b, size in ends]
+    parts = [
+        np.linspace(a, b, max(1, round((b - a) / size)) + 1) for a, b in zip(places, places[1:])
+    ]
     return np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
 
 
@@ -31,18 +34,14 @@ def named(mesh: Any, sides: Mapping[str, Callable[[np.ndarray], np.ndarray]]) ->
     return mesh.with_boundaries({name: facets[inside(middle)] for name, inside in sides.items()})
 
 
-def quads(corners: Any, s: np.ndarray, t: np.ndarray, touch: tuple[str, float, float] | None = None) -> Any:
-    """Quadrilaterals between four corners; sides bottom, right, top, left, and `contact`, a share of a side."""
+def quads(corners: Any, s: np.ndarray, t: np.ndarray) -> Any:
+    """Quadrilaterals between four corners; sides bottom, right, top, left."""
     ends = {"bottom": "y-", "right": "x+", "top": "y+", "left": "x-"}
-    flat = tensor_mesh(s / s[-1], t / t[-1])
+    flat = tensor_mesh(s, (t - t[0]) / (t[-1] - t[0]))
     (x, y), (a, b, c, d) = flat.p, np.asarray(corners, dtype=float)[:, :, None]
     places = (1 - x) * (1 - y) * a + x * (1 - y) * b + x * y * c + (1 - x) * y * d
     names = {new: flat.boundaries[old] for new, old in ends.items()}
-    if touch is not None:
-        side, low, high = touch
-        along = flat.p[int(side in ("left", "right"))][flat.facets[:, names[side]]].mean(axis=0)
-        names["contact"] = names[side][(along > low) & (along < high)]
-    return type(flat)(places, flat.t).with_boundaries(names)
+    return type(flat)(np.ascontiguousarray(places), flat.t).with_boundaries(names)
 
 
 def ring(radii: np.ndarray, angles: np.ndarray) -> Any:
@@ -54,7 +53,10 @@ def ring(radii: np.ndarray, angles: np.ndarray) -> Any:
     after = np.roll(node, -1, axis=1)
     from skfem import MeshQuad
 
-    made = MeshQuad(np.ascontiguousarray(points), np.stack([node[:-1], node[1:], after[1:], after[:-1]]).reshape(4, -1))
+    made = MeshQuad(
+        np.ascontiguousarray(points),
+        np.stack([node[:-1], node[1:], after[1:], after[:-1]]).reshape(4, -1),
+    )
     middle = radii.mean()
     sides = {"inside": lambda x: np.hypot(*x) < middle, "outside": lambda x: np.hypot(*x) > middle}
     return named(made, sides)
@@ -70,7 +72,9 @@ def extruded(mesh: Any, z: np.ndarray) -> Any:
     levels = corners // n
     flat = levels.min(axis=0) == levels.max(axis=0)
     number = {tuple(pair): i for i, pair in enumerate(np.sort(mesh.facets, axis=0).T)}
-    below = np.array([-1 if end else number[tuple(np.unique(own % n))] for end, own in zip(flat, corners.T)])
+    below = np.array(
+        [-1 if end else number[tuple(np.unique(own % n))] for end, own in zip(flat, corners.T)]
+    )
     sides = {name: facets[np.isin(below, own)] for name, own in mesh.boundaries.items()}
     ends = {"near": facets[flat & (levels[0] == 0)], "far": facets[flat & (levels[0] > 0)]}
     return made.with_boundaries(sides | ends)
@@ -90,8 +94,13 @@ def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
             points = [geo.addPoint(x, y, 0, size) for x, y, size, _ in loop]
             lines = []
             for i, (*_, name) in enumerate(loop):
-                ends, bent = (points[i], points[(i + 1) % len(loop)]), arcs and not name.startswith("straight")
-                lines.append(geo.addCircleArc(ends[0], middle, ends[1]) if bent else geo.addLine(*ends))
+                ends, bent = (
+                    (points[i], points[(i + 1) % len(loop)]),
+                    arcs and not name.startswith("straight"),
+                )
+                lines.append(
+                    geo.addCircleArc(ends[0], middle, ends[1]) if bent else geo.addLine(*ends)
+                )
                 groups.setdefault(name, []).append(lines[-1])
             curves.append(geo.addCurveLoop(lines))
         geo.addPlaneSurface(curves, 1)
@@ -118,14 +127,18 @@ class Move:
     stress: float = 1.0
     seed: int | None = None
 
-    def vector(self, values: Mapping[str, float], names: tuple[str, ...], factor: float) -> dict[str, float]:
+    def vector(
+        self, values: Mapping[str, float], names: tuple[str, ...], factor: float
+    ) -> dict[str, float]:
         """Components by name, of which some may be missing if R exchanges axes only."""
         own = np.array([values.get(name, 0.0) for name in names])
         full = self.R @ own * factor
         if len(values) == len(names):
             return dict(zip(names, full.tolist()))
         there = np.abs(self.R) @ np.array([name in values for name in names], dtype=float)
-        return {name: value for name, value, given in zip(names, full.tolist(), there) if given > 0.5}
+        return {
+            name: value for name, value, given in zip(names, full.tolist(), there) if given > 0.5
+        }
 
     def back(self, vectors: np.ndarray) -> np.ndarray:
         """Vectors (dim, m) of the moved scene in the frame of the first, without units."""
@@ -140,7 +153,9 @@ class Move:
         place = rng.permutation(points.shape[1])
         moved = np.empty_like(points)
         moved[:, place] = points
-        made = type(mesh)(moved, np.ascontiguousarray(place[mesh.t][:, rng.permutation(mesh.nelements)]))
+        made = type(mesh)(
+            moved, np.ascontiguousarray(place[mesh.t][:, rng.permutation(mesh.nelements)])
+        )
         number = {tuple(sorted(own)): i for i, own in enumerate(made.facets.T)}
         sides = {
             name: np.array([number[tuple(sorted(place[own]))] for own in mesh.facets[:, facets].T])
@@ -154,9 +169,13 @@ class Move:
         if isinstance(part, HalfSpace):
             force = None if part.force is None else self.vector(part.force, names, S * L**2)
             height = None if part.height is None else lambda x: L * part.height(x / L)
-            points = tuple(L * row for row in part.points)
+            points, depth = (
+                tuple(L * row for row in part.points),
+                None if part.depth is None else L * part.depth,
+            )
+            own = replace(part.material, E=part.material.E * S)
             return replace(
-                part, points=points, height=height, force=force, material=replace(part.material, E=part.material.E * S)
+                part, points=points, height=height, force=force, depth=depth, material=own
             )
         if isinstance(part, Rigid):
             gap = None if part.gap is None else lambda x: L * part.gap(self.R.T @ x / L)
@@ -172,16 +191,25 @@ class Move:
                 factor = S / L if isinstance(load, BodyForce) else S
                 loads.append(replace(load, value=tuple(self.R @ np.array(load.value) * factor)))
         supports = tuple(
-            held if held.displacement is None else replace(held, displacement=self.vector(held.displacement, names, L))
+            held
+            if held.displacement is None
+            else replace(held, displacement=self.vector(held.displacement, names, L))
             for held in part.supports
         )
         curves = {name: self._curve(own) for name, own in (part.curve or {}).items()} or None
         material = replace(part.material, E=part.material.E * S)
         return replace(
-            part, mesh=self.mesh(part.mesh), material=material, supports=supports, loads=tuple(loads), curve=curves
+            part,
+            mesh=self.mesh(part.mesh),
+            material=material,
+            supports=supports,
+            loads=tuple(loads),
+            curve=curves,
         )
 
-    def _curve(self, curve: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+    def _curve(
+        self, curve: Callable[[np.ndarray], np.ndarray]
+    ) -> Callable[[np.ndarray], np.ndarray]:
         return lambda x: self.length * (self.R @ curve(self.R.T @ x / self.length))
 
     def scene(self, scene: Scene) -> Scene:
@@ -201,11 +229,23 @@ def random_move(rng: np.random.Generator, scene: Scene, swapped: bool = False) -
     elif scene.kind == "axisymmetric":
         R = np.diag([1.0, rng.choice([-1.0, 1.0])])
     else:
-        given = [support.displacement for part in scene.bodies if isinstance(part, Part) for support in part.supports]
+        given = [
+            support.displacement
+            for part in scene.bodies
+            if isinstance(part, Part)
+            for support in part.supports
+        ]
         given += [load.force for part in scene.bodies if isinstance(part, Part) for load in part.loads
                   if isinstance(load, Plate)]  # fmt: skip
-        given += [value for part in scene.bodies if isinstance(part, Rigid) for value in (part.force, part.displacement)]
+        given += [
+            value
+            for part in scene.bodies
+            if isinstance(part, Rigid)
+            for value in (part.force, part.displacement)
+        ]
         R = np.linalg.qr(rng.normal(size=(dim, dim)))[0] * rng.choice([-1.0, 1.0], dim)
         if not all(values is None or len(values) == dim for values in given):
             R = np.eye(dim)[rng.permutation(dim)] * rng.choice([-1.0, 1.0], dim)
-    return Move(R, 10.0 ** rng.integers(-3, 4), 10.0 ** rng.integers(-3, 7), int(rng.integers(1000)))
+    return Move(
+        R, 10.0 ** rng.integers(-3, 4), 10.0 ** rng.integers(-3, 7), int(rng.integers(1000))
+    )
