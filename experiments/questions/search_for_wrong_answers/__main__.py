@@ -69,16 +69,12 @@ def report(found: list[tuple[Verdict, float]]) -> None:
                 "family": family,
                 "scenes": len(mine),
                 "disagreements": sum(bool(verdict.wrong) for verdict, _ in mine),
-                "width": float(
-                    np.median([width for verdict, _ in mine for width in verdict.widths or (0.0,)])
-                ),
+                "width": float(np.median([width for verdict, _ in mine for width in verdict.widths or (0.0,)])),
                 "seconds a scene": float(np.mean([seconds for _, seconds in mine])),
             }
         )
     wrong = [verdict for verdict, _ in found if verdict.wrong]
-    listed = "\n".join(
-        f"- seed {each.seed}, {each.family}: {'; '.join(each.wrong[:3])}" for each in wrong
-    )
+    listed = "\n".join(f"- seed {each.seed}, {each.family}: {'; '.join(each.wrong[:3])}" for each in wrong)
     seeds = [verdict.seed for verdict, _ in found]
     text = TEXT.replace("{table}", "TABLE").format(
         first=min(seeds),

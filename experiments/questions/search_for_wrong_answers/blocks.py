@@ -89,10 +89,7 @@ class Blocks:
     def scene(self, mesh: Callable[[Block], Any], **given: Any) -> Scene:
         """The scene with these meshes; `given` are settings of its contacts, and the degree."""
         degree = given.pop("degree")
-        bodies = [
-            Part(b.name, mesh(b), b.material, b.supports, b.loads, curve=b.curve)
-            for b in self.blocks
-        ]
+        bodies = [Part(b.name, mesh(b), b.material, b.supports, b.loads, curve=b.curve) for b in self.blocks]
         pairs = tuple(Contact(*pair, self.mu, law=self.law, **given) for pair in self.contacts)
         own = dict(self.settings)
         return Scene("search", bodies=(*bodies, *self.rigid), contacts=pairs, degree=degree, **own)
@@ -100,9 +97,7 @@ class Blocks:
     def matching(self, rng: Random, depth: float | None = None) -> Way:
         """The first way: quadrilaterals or triangles cut from them, or bricks, whose nodes match."""
         cut, degree = rng.random() < 0.3, int(rng.integers(1, 3 if depth is None else 2))
-        marks = [
-            x for b in self.blocks for side, *x in b.touch.values() if side in ("top", "bottom")
-        ]
+        marks = [x for b in self.blocks for side, *x in b.touch.values() if side in ("top", "bottom")]
 
         def build(level: int) -> Scene:
             h = self.size / (2.0 if depth is None else 1.4) ** level
@@ -165,9 +160,7 @@ def oblique(rng: Random, mu: float, force: float) -> dict[str, float]:
 def inside(blocks: tuple[Block, ...]) -> dict[str, list[tuple[float, ...]]]:
     """Two points in every block."""
     shares = [[0.25] * 4, [0.2, 0.3, 0.4, 0.1]]
-    return {
-        b.name: [tuple(np.array(share) @ np.array(b.corners)) for share in shares] for b in blocks
-    }
+    return {b.name: [tuple(np.array(share) @ np.array(b.corners)) for share in shares] for b in blocks}
 
 
 def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
@@ -180,9 +173,7 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
         thin = layer and not solid and rng.random() < 0.4
         high = float(rng.uniform(0.05, 0.2) if thin else rng.uniform(0.5, 1.5))
         lean = rng.uniform(-0.15, 0.15, 2) * (right - left) * (layer == layers - 1)
-        corners.append(
-            [(left, y), (right, y), (right + lean[1], y + high), (left + lean[0], y + high)]
-        )
+        corners.append([(left, y), (right, y), (right + lean[1], y + high), (left + lean[0], y + high)])
         wide = (right - left) * float(1.0 if rng.random() < 0.3 else rng.uniform(0.5, 0.95))
         apart = float(rng.uniform(0.01, 0.3)) * float(rng.random() < 0.3 and layer < layers - 1)
         left += float(rng.uniform(0, 1)) * (right - left - wide)
@@ -202,41 +193,27 @@ def stack(rng: Random, layers: int = 2, solid: str = "") -> Case:
     made = []
     for i, own in enumerate(corners):
         touch = {"under": ("bottom", own[0][0], own[1][0])} if i else {}
-        touch |= (
-            {"over": ("top", corners[i + 1][0][0], corners[i + 1][1][0])} if i < layers - 1 else {}
-        )
+        touch |= {"over": ("top", corners[i + 1][0][0], corners[i + 1][1][0])} if i < layers - 1 else {}
         held = (() if i else (Support("bottom"),)) + (top if i == layers - 1 else ())
         loads = carried if i == layers - 1 and kind != "moved" else ()
         made.append(Block(f"body {i}", own, material(rng), touch, held, loads))
-    law = (
-        str(rng.choice(["coulomb", "tresca", "tied"], p=[0.8, 0.1, 0.1]))
-        if mu and not gaps
-        else "coulomb"
-    )
+    law = str(rng.choice(["coulomb", "tresca", "tied"], p=[0.8, 0.1, 0.1])) if mu and not gaps else "coulomb"
     pairs = tuple((f"body {i + 1}:under", f"body {i}:over") for i in range(layers - 1))
-    size = min(
-        [2 * (c[2][1] - c[1][1]) for c in corners] + [(c[1][0] - c[0][0]) / 8 for c in corners[1:]]
-    )
+    size = min([2 * (c[2][1] - c[1][1]) for c in corners] + [(c[1][0] - c[0][0]) / 8 for c in corners[1:]])
     bound = mu * force if law == "tresca" else mu
     plane = Blocks(tuple(made), pairs, bound, size, settings=(("thickness", depth),), law=law)
     points, loose = inside(plane.blocks), 1.001 * gaps
     if not solid:
-        return Case(
-            f"{layers} blocks", (plane.matching(rng), plane.unlike(rng)), points, loose=loose
-        )
+        return Case(f"{layers} blocks", (plane.matching(rng), plane.unlike(rng)), points, loose=loose)
     ends = tuple(Support(name, {"z": 0.0}) for name in ("near", "far")) if solid == "slab" else ()
     blocks = tuple(
         replace(
             block,
             supports=tuple(
-                held if held.displacement is None else Support("top", {**shift, "z": 0.0})
-                for held in block.supports
+                held if held.displacement is None else Support("top", {**shift, "z": 0.0}) for held in block.supports
             )
             + ends,
-            loads=tuple(
-                own if kind == "plate" else replace(own, value=own.value + third)
-                for own in block.loads
-            ),
+            loads=tuple(own if kind == "plate" else replace(own, value=own.value + third) for own in block.loads),
         )
         for block in plane.blocks
     )
@@ -280,9 +257,7 @@ def crown(rng: Random, ring: bool = False) -> Case:
         (scene.matching(rng), scene.unlike(rng)),
         {"upper": [(0.3, 0.6 * high)], "lower": [(0.2, -0.5 * low)]},
     )
-    return Case(
-        f"crown, {kind}", ways, points, not ring, True, loose=a**2 / radius, strain=a / radius
-    )
+    return Case(f"crown, {kind}", ways, points, not ring, True, loose=a**2 / radius, strain=a / radius)
 
 
 def wedge(rng: Random) -> Case:
@@ -325,17 +300,11 @@ def bridge(rng: Random) -> Case:
     }
     beam = [(0.0, high), (long, high), (long, high + thick), (0.0, high + thick)]
     touch = {f"on {name}": ("bottom", *foot) for name, foot in feet.items()}
-    blocks = [
-        Block("beam", beam, material(rng), touch, (), (Plate("top", oblique(rng, mu, 3e-3)),))
-    ]
+    blocks = [Block("beam", beam, material(rng), touch, (), (Plate("top", oblique(rng, mu, 3e-3)),))]
     for name, (a, b) in feet.items():
         pier = [(a, 0.0), (b, 0.0), (b, high), (a, high)]
-        blocks.append(
-            Block(name, pier, material(rng), {"head": ("top", a, b)}, (Support("bottom"),))
-        )
-    scene = Blocks(
-        tuple(blocks), tuple((f"beam:on {name}", f"{name}:head") for name in feet), mu, 0.1
-    )
+        blocks.append(Block(name, pier, material(rng), {"head": ("top", a, b)}, (Support("bottom"),)))
+    scene = Blocks(tuple(blocks), tuple((f"beam:on {name}", f"{name}:head") for name in feet), mu, 0.1)
     return Case("beam on two piers", (scene.matching(rng), scene.unlike(rng)), inside(scene.blocks))
 
 

@@ -68,8 +68,7 @@ def swapped(scene: Scene) -> Scene:
     """The scene with upper and lower exchanged in every pair."""
     other = {"upper": "lower", "lower": "upper", None: None}
     pairs = tuple(
-        replace(pair, upper=pair.lower, lower=pair.upper, carrier=other[pair.carrier])
-        for pair in scene.contacts
+        replace(pair, upper=pair.lower, lower=pair.upper, carrier=other[pair.carrier]) for pair in scene.contacts
     )
     return replace(scene, contacts=pairs, bodies=tuple(_turned(part) for part in scene.bodies))
 
@@ -112,14 +111,10 @@ def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
         found[f"bearing {i}"] = float(np.sum(np.sqrt(n * area)) ** 2 / total)
         if case.smooth:
             found[f"pressure {i}"] = float(np.sum(n[area > 0] ** 2 / area[area > 0]) / total)
-        found[f"reach {i}"] = float(
-            np.sqrt(np.sum(n * np.sum(places[:, own] ** 2, axis=0)) / total)
-        )
+        found[f"reach {i}"] = float(np.sqrt(np.sum(n * np.sum(places[:, own] ** 2, axis=0)) / total))
         found[f"stick {i}"] = float(n[status.stick[own]].sum() / total)
         if case.whole:
-            found |= {
-                f"centre {axis} {i}": float(x @ n / total) for axis, x in enumerate(places[:, own])
-            }
+            found |= {f"centre {axis} {i}": float(x @ n / total) for axis, x in enumerate(places[:, own])}
         if case.smooth:
             found[f"peak {i}"] = (result.summary["pressure"] or table["max_pressure"]) / S
     for body in result.fields:
@@ -130,9 +125,7 @@ def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
             values = np.column_stack([moved_by.T, body.von_mises / S, mean / S])
             read_off = fitted(at - np.array(point)[:, None], values)
             names = [f"moved {axis}" for axis in range(len(axes))] + ["von_mises", "mean_stress"]
-            found |= {
-                f"{name} {body.name} {j}": float(value) for name, value in zip(names, read_off)
-            }
+            found |= {f"{name} {body.name} {j}": float(value) for name, value in zip(names, read_off)}
     return found
 
 
@@ -159,9 +152,7 @@ def scale_of(name: str, values: list[Values]) -> float:
     same = groups.get(kind, (name,))
     if kind == "stick":
         return 1.0
-    sizes = [
-        abs(own[key]) for own in values for key in own if key in same or key.split()[0] in same
-    ]
+    sizes = [abs(own[key]) for own in values for key in own if key in same or key.split()[0] in same]
     return max(sizes, default=1.0) or 1.0
 
 
@@ -210,16 +201,12 @@ def judge(seed: int, case: Case) -> Verdict:
     levels: list[list[Values]] = []
     try:
         for way in case.ways:
-            levels.append(
-                [way] if isinstance(way, dict) else [read(way, level, case) for level in LEVELS]
-            )
+            levels.append([way] if isinstance(way, dict) else [read(way, level, case) for level in LEVELS])
         wrong, widths = compared(case, levels)
         if wrong:
             finer = LEVELS[-1] + 1
             for i, way in enumerate(case.ways):
-                levels[i] = (
-                    [way] if isinstance(way, dict) else [*levels[i][1:], read(way, finer, case)]
-                )
+                levels[i] = [way] if isinstance(way, dict) else [*levels[i][1:], read(way, finer, case)]
             wrong, widths = compared(case, levels)
         way = case.ways[1]
         bent = way.swapped and any(isinstance(part, HalfSpace) for part in way.build(0).bodies)
@@ -227,9 +214,7 @@ def judge(seed: int, case: Case) -> Verdict:
             wrong += unmoved(case, way)
     except Exception as failure:  # whatever stops a scene is what is looked for
         where = traceback.extract_tb(failure.__traceback__)[-1]
-        return Verdict(
-            seed, case.family, (f"{type(failure).__name__} at {where.name}: {str(failure)[:160]}",)
-        )
+        return Verdict(seed, case.family, (f"{type(failure).__name__} at {where.name}: {str(failure)[:160]}",))
     return Verdict(seed, case.family, tuple(sorted(wrong)), tuple(widths))
 
 
@@ -239,6 +224,5 @@ def unmoved(case: Case, way: Way) -> list[str]:
     return [
         f"{name} moved: {still[name]:.8g} becomes {moved[name]:.8g}"
         for name in still
-        if name.split()[0] != "peak"
-        and not abs(still[name] - moved[name]) <= SHARP * scale_of(name, [still, moved])
+        if name.split()[0] != "peak" and not abs(still[name] - moved[name]) <= SHARP * scale_of(name, [still, moved])
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,10 +21,8 @@ Corner = tuple[
 
 def ticks(places: list[float], size: float) -> np.ndarray:
     """A grid through some places, whose cells are about as long as given."""
-    places = [x for x, after in zip(places, places[1:]) if after - x > 1e-9] + places[-1:]
-    parts = [
-        np.linspace(a, b, max(1, round((b - a) / size)) + 1) for a, b in zip(places, places[1:])
-    ]
+    places = [x for x, after in pairwise(places) if after - x > 1e-9] + places[-1:]
+    parts = [np.linspace(a, b, max(1, round((b - a) / size)) + 1) for a, b in pairwise(places)]
     return np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
 
 
@@ -72,9 +71,7 @@ def extruded(mesh: Any, z: np.ndarray) -> Any:
     levels = corners // n
     flat = levels.min(axis=0) == levels.max(axis=0)
     number = {tuple(pair): i for i, pair in enumerate(np.sort(mesh.facets, axis=0).T)}
-    below = np.array(
-        [-1 if end else number[tuple(np.unique(own % n))] for end, own in zip(flat, corners.T)]
-    )
+    below = np.array([-1 if end else number[tuple(np.unique(own % n))] for end, own in zip(flat, corners.T)])
     sides = {name: facets[np.isin(below, own)] for name, own in mesh.boundaries.items()}
     ends = {"near": facets[flat & (levels[0] == 0)], "far": facets[flat & (levels[0] > 0)]}
     return made.with_boundaries(sides | ends)
@@ -98,9 +95,7 @@ def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
                     (points[i], points[(i + 1) % len(loop)]),
                     arcs and not name.startswith("straight"),
                 )
-                lines.append(
-                    geo.addCircleArc(ends[0], middle, ends[1]) if bent else geo.addLine(*ends)
-                )
+                lines.append(geo.addCircleArc(ends[0], middle, ends[1]) if bent else geo.addLine(*ends))
                 groups.setdefault(name, []).append(lines[-1])
             curves.append(geo.addCurveLoop(lines))
         geo.addPlaneSurface(curves, 1)
@@ -127,18 +122,14 @@ class Move:
     stress: float = 1.0
     seed: int | None = None
 
-    def vector(
-        self, values: Mapping[str, float], names: tuple[str, ...], factor: float
-    ) -> dict[str, float]:
+    def vector(self, values: Mapping[str, float], names: tuple[str, ...], factor: float) -> dict[str, float]:
         """Components by name, of which some may be missing if R exchanges axes only."""
         own = np.array([values.get(name, 0.0) for name in names])
         full = self.R @ own * factor
         if len(values) == len(names):
             return dict(zip(names, full.tolist()))
         there = np.abs(self.R) @ np.array([name in values for name in names], dtype=float)
-        return {
-            name: value for name, value, given in zip(names, full.tolist(), there) if given > 0.5
-        }
+        return {name: value for name, value, given in zip(names, full.tolist(), there) if given > 0.5}
 
     def back(self, vectors: np.ndarray) -> np.ndarray:
         """Vectors (dim, m) of the moved scene in the frame of the first, without units."""
@@ -153,9 +144,7 @@ class Move:
         place = rng.permutation(points.shape[1])
         moved = np.empty_like(points)
         moved[:, place] = points
-        made = type(mesh)(
-            moved, np.ascontiguousarray(place[mesh.t][:, rng.permutation(mesh.nelements)])
-        )
+        made = type(mesh)(moved, np.ascontiguousarray(place[mesh.t][:, rng.permutation(mesh.nelements)]))
         number = {tuple(sorted(own)): i for i, own in enumerate(made.facets.T)}
         sides = {
             name: np.array([number[tuple(sorted(place[own]))] for own in mesh.facets[:, facets].T])
@@ -174,9 +163,7 @@ class Move:
                 None if part.depth is None else L * part.depth,
             )
             own = replace(part.material, E=part.material.E * S)
-            return replace(
-                part, points=points, height=height, force=force, depth=depth, material=own
-            )
+            return replace(part, points=points, height=height, force=force, depth=depth, material=own)
         if isinstance(part, Rigid):
             gap = None if part.gap is None else lambda x: L * part.gap(self.R.T @ x / L)
             normal = None if part.normal is None else tuple(self.R @ np.array(part.normal))
@@ -191,9 +178,7 @@ class Move:
                 factor = S / L if isinstance(load, BodyForce) else S
                 loads.append(replace(load, value=tuple(self.R @ np.array(load.value) * factor)))
         supports = tuple(
-            held
-            if held.displacement is None
-            else replace(held, displacement=self.vector(held.displacement, names, L))
+            held if held.displacement is None else replace(held, displacement=self.vector(held.displacement, names, L))
             for held in part.supports
         )
         curves = {name: self._curve(own) for name, own in (part.curve or {}).items()} or None
@@ -207,9 +192,7 @@ class Move:
             curve=curves,
         )
 
-    def _curve(
-        self, curve: Callable[[np.ndarray], np.ndarray]
-    ) -> Callable[[np.ndarray], np.ndarray]:
+    def _curve(self, curve: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
         return lambda x: self.length * (self.R @ curve(self.R.T @ x / self.length))
 
     def scene(self, scene: Scene) -> Scene:
@@ -229,23 +212,13 @@ def random_move(rng: np.random.Generator, scene: Scene, swapped: bool = False) -
     elif scene.kind == "axisymmetric":
         R = np.diag([1.0, rng.choice([-1.0, 1.0])])
     else:
-        given = [
-            support.displacement
-            for part in scene.bodies
-            if isinstance(part, Part)
-            for support in part.supports
-        ]
+        given = [support.displacement for part in scene.bodies if isinstance(part, Part) for support in part.supports]
         given += [load.force for part in scene.bodies if isinstance(part, Part) for load in part.loads
                   if isinstance(load, Plate)]  # fmt: skip
         given += [
-            value
-            for part in scene.bodies
-            if isinstance(part, Rigid)
-            for value in (part.force, part.displacement)
+            value for part in scene.bodies if isinstance(part, Rigid) for value in (part.force, part.displacement)
         ]
         R = np.linalg.qr(rng.normal(size=(dim, dim)))[0] * rng.choice([-1.0, 1.0], dim)
         if not all(values is None or len(values) == dim for values in given):
             R = np.eye(dim)[rng.permutation(dim)] * rng.choice([-1.0, 1.0], dim)
-    return Move(
-        R, 10.0 ** rng.integers(-3, 4), 10.0 ** rng.integers(-3, 7), int(rng.integers(1000))
-    )
+    return Move(R, 10.0 ** rng.integers(-3, 4), 10.0 ** rng.integers(-3, 7), int(rng.integers(1000)))

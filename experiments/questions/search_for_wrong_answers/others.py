@@ -77,22 +77,16 @@ def pin(rng: Random) -> Case:
     def structured(level: int) -> Scene:
         count = 28 * 2**level
         around = turn + 2 * np.pi * np.arange(count) / count
-        return scene(
-            lambda name: ring(np.geomspace(*radii[name], 4 * 2**level + 1), around), degree=1
-        )
+        return scene(lambda name: ring(np.geomspace(*radii[name], 4 * 2**level + 1), around), degree=1)
 
     def free(level: int) -> Scene:
         def loop(r: float, h: float, name: str) -> Any:
-            return [
-                (r * np.cos(t), r * np.sin(t), h, name) for t in turn + np.pi / 2 * np.arange(4)
-            ]
+            return [(r * np.cos(t), r * np.sin(t), h, name) for t in turn + np.pi / 2 * np.arange(4)]
 
         def mesh(name: str) -> Any:
             (low, high), h = radii[name], 2 * np.pi / (28 * 2**level)
             inner, outward = shares * h if name == "bush" else shares[::-1] * h
-            return outlined(
-                loop(high, outward, "outside"), loop(low, inner, "inside"), order=order, arcs=True
-            )
+            return outlined(loop(high, outward, "outside"), loop(low, inner, "inside"), order=order, arcs=True)
 
         return scene(mesh, **given)
 
@@ -145,9 +139,7 @@ def fit(rng: Random) -> Case:
                 sides,
                 curve={"outside": circle(rims[0])},
             ),
-            Part(
-                "hub", quarter(rims[1], outer, h[1]), hub, sides, curve={"inside": circle(rims[1])}
-            ),
+            Part("hub", quarter(rims[1], outer, h[1]), hub, sides, curve={"inside": circle(rims[1])}),
         ]
         return scene_of(bodies, ("shaft:outside", "hub:inside"), mu, copies=4, **given)
 
@@ -178,9 +170,7 @@ def roller(rng: Random) -> Case:
     )
 
     def half(level: int) -> Scene:
-        return cylinder(
-            radius=1.0, depth=1.0, upper=one, lower=two, mu=mu, elements=6 * 2**level, **sizes
-        )
+        return cylinder(radius=1.0, depth=1.0, upper=one, lower=two, mu=mu, elements=6 * 2**level, **sizes)
 
     def build(level: int) -> Scene:
         h, c = a / (5 * 2**level) * fine, wide / 2
@@ -190,9 +180,7 @@ def roller(rng: Random) -> Case:
             (0.0, far, "straight top"),
         ]
         made = outlined([(np.cos(t), np.sin(t), s, name) for t, s, name in ends], arcs=True)
-        disc = type(made)(made.doflocs + np.array([[0.0], [1.0]]), made.t).with_boundaries(
-            made.boundaries
-        )
+        disc = type(made)(made.doflocs + np.array([[0.0], [1.0]]), made.t).with_boundaries(made.boundaries)
         flat = [(-c, -high, far, "bottom"), (c, -high, far, "right"), (c, 0.0, far, "over"), (1.3 * a, 0.0, h, "over"),
                 (-1.3 * a, 0.0, h, "over"), (-c, 0.0, far, "left")]  # fmt: skip
         load = Plate("straight top", {"y": -force})
@@ -202,9 +190,7 @@ def roller(rng: Random) -> Case:
         ]
         return scene_of(bodies, ("cylinder:arc", "foundation:over"), mu, **given)
 
-    return Case(
-        "roller", (Way(half), moved(rng, build)), whole=False, smooth=True, loose=a**2, strain=a
-    )
+    return Case("roller", (Way(half), moved(rng, build)), whole=False, smooth=True, loose=a**2, strain=a)
 
 
 def ball(rng: Random) -> Case:
@@ -223,11 +209,7 @@ def ball(rng: Random) -> Case:
             h = a / (6 * 2**level if section else 3 * 1.4**level) * (1.0 if section else share[i])
             across, rise = ticks([0.0, 0.9, 1.0], h), graded(high, h, 1.3 ** (0.5**level))
             rise = -rise[::-1] if i else rise
-            flat = (
-                tensor_mesh(across, rise)
-                if section
-                else extrude(*half_disc(across, max(2, len(across) // 4)), rise)
-            )
+            flat = tensor_mesh(across, rise) if section else extrude(*half_disc(across, max(2, len(across) // 4)), rise)
             r = np.hypot(*flat.p[:-1]) if len(flat.p) == 3 else flat.p[0]
             middle = flat.p[:, flat.facets].mean(axis=1)
             touch = (np.abs(middle[-1]) < 1e-9) & (np.linalg.norm(middle[:-1], axis=0) < 0.9)
@@ -241,9 +223,7 @@ def ball(rng: Random) -> Case:
             mesh = named(type(flat)(p, flat.t), sides)
             mesh = mesh.with_boundaries({**mesh.boundaries, "contact": np.flatnonzero(touch)})
             held = Support("axis", {"r": 0.0} if section else {"y": 0.0})
-            supports, loads = (
-                ((held, Support("far")), ()) if i else ((held,), (Plate("far", {"z": -force}),))
-            )
+            supports, loads = ((held, Support("far")), ()) if i else ((held,), (Plate("far", {"z": -force}),))
             bodies.append(Part(["upper", "lower"][i], mesh, own, supports, loads))
         kind = {"kind": "axisymmetric"} if section else {"kind": "solid", "copies": 2}
         return scene_of(bodies, ("upper", "lower"), mu, **kind)
@@ -306,24 +286,14 @@ def exact(rng: Random) -> Case:
 
     def build(level: int) -> Scene:
         count = (10 if solid else 48) * 2**level
-        row = (
-            (np.arange(count) + 0.5) * 2 * a / share / count
-            if wave
-            else np.linspace(-wide, wide, count) + shift[0]
-        )
-        points = (
-            (row, np.linspace(-wide, wide, count + 1) + shift[1])
-            if solid
-            else (row - a / share * wave,)
-        )
+        row = (np.arange(count) + 0.5) * 2 * a / share / count if wave else np.linspace(-wide, wide, count) + shift[0]
+        points = (row, np.linspace(-wide, wide, count + 1) + shift[1]) if solid else (row - a / share * wave,)
         load = {"z" if solid else "y": -force}
         upper: Any = Rigid("upper", gap=gap, force=load)
         if not rigid:
             upper = HalfSpace("upper", one, points, height=lambda x: -gap(x), force=load)
         ground = HalfSpace("lower", two, points, periodic=bool(wave))
-        return scene_of(
-            [upper, ground], ("upper", "lower"), 0.0, kind="solid" if solid else "plane-strain"
-        )
+        return scene_of([upper, ground], ("upper", "lower"), 0.0, kind="solid" if solid else "plane-strain")
 
     second = moved(rng, build, (0, 1, 2) if solid else (0, 1))
     return Case("half-space, exact", (known, second), smooth=True)
@@ -358,9 +328,7 @@ def heights(rng: Random) -> Case:
         height = (lambda x: -gap(x)) if high else None
         points, depth = ((row, row), None) if solid else ((row,), 3.0)
         ground = HalfSpace("ground", own, points, height=height, periodic=periodic, depth=depth)
-        return scene_of(
-            [body, ground], ("body", "ground"), mu, kind="solid" if solid else "plane-strain"
-        )
+        return scene_of([body, ground], ("body", "ground"), mu, kind="solid" if solid else "plane-strain")
 
     ways = (
         Way(lambda level: build(level, False), axes),
@@ -395,9 +363,7 @@ def large(rng: Random) -> Case:
         c, h = 15.0 * 2**level, share / (8 * 2**level)
         ends = [(-c, -c, "bottom"), (c, -c, "right"), (c, 0, "top"), (2, 0, "over"), (1.3, 0, "over"), (-1.3, 0, "over"),
                 (-2, 0, "top"), (-c, 0, "left")]  # fmt: skip
-        mesh = outlined(
-            [(x, y, c / 5 if abs(x) > 5 else h * (1 + (abs(x) > 1.5)), name) for x, y, name in ends]
-        )
+        mesh = outlined([(x, y, c / 5 if abs(x) > 5 else h * (1 + (abs(x) > 1.5)), name) for x, y, name in ends])
         part, body = (
             Part("ground", mesh, own, (Support("bottom"),)),
             Rigid("body", (0.0, 1.0), gap, load),
