@@ -77,12 +77,7 @@ def report(found: list[tuple[Verdict, float]]) -> None:
     listed = "\n".join(f"- seed {each.seed}, {each.family}: {'; '.join(each.wrong[:3])}" for each in wrong)
     seeds = [verdict.seed for verdict, _ in found]
     text = TEXT.replace("{table}", "TABLE").format(
-        first=min(seeds),
-        last=max(seeds),
-        scenes=len(found),
-        count=len(wrong),
-        sharp=SHARP,
-        listed=listed,
+        first=min(seeds), last=max(seeds), scenes=len(found), count=len(wrong), sharp=SHARP, listed=listed
     )
     text = text.replace("{", "(").replace("}", ")").replace("TABLE", "{table}")
     write("search_for_wrong_answers", "A search for wrong answers", text, {"table": rows}, {})

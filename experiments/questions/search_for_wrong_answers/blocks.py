@@ -12,13 +12,7 @@ from contactopt import BodyForce, Contact, Material, Part, Plate, Rigid, Scene, 
 from contactopt.analytic import contact_modulus
 from contactopt.scenes.meshes import simplices
 from experiments.questions.search_for_wrong_answers.compare import Case, Way
-from experiments.questions.search_for_wrong_answers.meshes import (
-    extruded,
-    outlined,
-    quads,
-    random_move,
-    ticks,
-)
+from experiments.questions.search_for_wrong_answers.meshes import extruded, outlined, quads, random_move, ticks
 
 Random = np.random.Generator
 Shape = Callable[[np.ndarray], np.ndarray]
@@ -262,16 +256,8 @@ def crown(rng: Random, ring: bool = False) -> Case:
 
 def wedge(rng: Random) -> Case:
     """A wedge pressed obliquely between two flanks."""
-    angle, high, half = (
-        np.radians(rng.uniform(15, 60)),
-        float(rng.uniform(0.6, 1.2)),
-        float(rng.uniform(0.15, 0.5)),
-    )
-    mu, side, out = (
-        float(rng.uniform(0, 0.6)),
-        high * np.tan(angle),
-        half + high * np.tan(angle) + 1.0,
-    )
+    angle, high, half = (np.radians(rng.uniform(15, 60)), float(rng.uniform(0.6, 1.2)), float(rng.uniform(0.15, 0.5)))
+    mu, side, out = (float(rng.uniform(0, 0.6)), high * np.tan(angle), half + high * np.tan(angle) + 1.0)
     load = Plate("top", {"x": float(rng.uniform(-3e-3, 3e-3)), "y": -0.01})
     corners = [(-half, 0.0), (half, 0.0), (half + side, high), (-half - side, high)]
     left = [(-out, 0.0), (-half, 0.0), (-half - side, high), (-out, high)]
@@ -289,15 +275,8 @@ def wedge(rng: Random) -> Case:
 
 def bridge(rng: Random) -> Case:
     """A beam on two piers: one surface in two pairs."""
-    mu, long, (thick, high) = (
-        friction(rng),
-        float(rng.uniform(3, 5)),
-        map(float, rng.uniform(0.4, 1.2, 2)),
-    )
-    feet = {
-        "left": (0.0, float(rng.uniform(0.4, 1))),
-        "right": (long - float(rng.uniform(0.4, 1)), long),
-    }
+    mu, long, (thick, high) = (friction(rng), float(rng.uniform(3, 5)), map(float, rng.uniform(0.4, 1.2, 2)))
+    feet = {"left": (0.0, float(rng.uniform(0.4, 1))), "right": (long - float(rng.uniform(0.4, 1)), long)}
     beam = [(0.0, high), (long, high), (long, high + thick), (0.0, high + thick)]
     touch = {f"on {name}": ("bottom", *foot) for name, foot in feet.items()}
     blocks = [Block("beam", beam, material(rng), touch, (), (Plate("top", oblique(rng, mu, 3e-3)),))]
@@ -310,18 +289,10 @@ def bridge(rng: Random) -> Case:
 
 def floor(rng: Random) -> Case:
     """An uneven block on a rigid floor: its shape is a function of the gap, or the shape of its mesh."""
-    mu, own, wide, high = (
-        friction(rng),
-        material(rng),
-        float(rng.uniform(1, 3)),
-        float(rng.uniform(0.5, 2)),
-    )
+    mu, own, wide, high = (friction(rng), material(rng), float(rng.uniform(1, 3)), float(rng.uniform(0.5, 2)))
     depth, waves = float(10 ** rng.uniform(-5, -3.5)) * wide, rng.uniform(0.5, 4, 3) * np.pi / wide
     phase, sizes, pushed = rng.uniform(0, 2 * np.pi, 3), rng.uniform(0.2, 1, 3), rng.random() < 0.3
-    force, lift = (
-        own.E * depth * float(10 ** rng.uniform(-0.7, 0.7)),
-        depth * float(rng.uniform(0.2, 2)),
-    )
+    force, lift = (own.E * depth * float(10 ** rng.uniform(-0.7, 0.7)), depth * float(rng.uniform(0.2, 2)))
 
     def shape(x: np.ndarray) -> np.ndarray:
         at = np.concatenate([np.linspace(0, wide, 1000), x[0]])
@@ -331,10 +302,7 @@ def floor(rng: Random) -> Case:
     def bend(x: np.ndarray) -> np.ndarray:
         return np.stack([x[0], x[1] + shape(x) * (1 - x[1] / high)])
 
-    corners, touch = (
-        [(0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high)],
-        {"under": ("bottom", 0.0, wide)},
-    )
+    corners, touch = ([(0.0, 0.0), (wide, 0.0), (wide, high), (0.0, high)], {"under": ("bottom", 0.0, wide)})
     block = Block("block", corners, own, touch, (), (Plate("top", oblique(rng, mu, force)),))
     ground = Rigid("floor", (0.0, 1.0), shape)
     if pushed:  # the floor is lifted in one way, the block pushed down in the other

@@ -85,10 +85,7 @@ def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
     scene = swapped(scene) if way.swapped else scene
     move = way.move if moved and way.move is not None else Move(np.eye(scene.dim))
     result = run(
-        move.scene(scene) if way.move is not None and moved else scene,
-        tol=TOL,
-        figures=(),
-        simplest=way.simplest,
+        move.scene(scene) if way.move is not None and moved else scene, tol=TOL, figures=(), simplest=way.simplest
     )
     if result.problem.dim < scene.dim:
         move = Move(np.eye(result.problem.dim))

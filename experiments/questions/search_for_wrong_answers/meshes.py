@@ -52,10 +52,7 @@ def ring(radii: np.ndarray, angles: np.ndarray) -> Any:
     after = np.roll(node, -1, axis=1)
     from skfem import MeshQuad
 
-    made = MeshQuad(
-        np.ascontiguousarray(points),
-        np.stack([node[:-1], node[1:], after[1:], after[:-1]]).reshape(4, -1),
-    )
+    made = MeshQuad(np.ascontiguousarray(points), np.stack([node[:-1], node[1:], after[1:], after[:-1]]).reshape(4, -1))
     middle = radii.mean()
     sides = {"inside": lambda x: np.hypot(*x) < middle, "outside": lambda x: np.hypot(*x) > middle}
     return named(made, sides)
@@ -91,10 +88,7 @@ def outlined(*loops: list[Corner], order: int = 1, arcs: bool = False) -> Any:
             points = [geo.addPoint(x, y, 0, size) for x, y, size, _ in loop]
             lines = []
             for i, (*_, name) in enumerate(loop):
-                ends, bent = (
-                    (points[i], points[(i + 1) % len(loop)]),
-                    arcs and not name.startswith("straight"),
-                )
+                ends, bent = ((points[i], points[(i + 1) % len(loop)]), arcs and not name.startswith("straight"))
                 lines.append(geo.addCircleArc(ends[0], middle, ends[1]) if bent else geo.addLine(*ends))
                 groups.setdefault(name, []).append(lines[-1])
             curves.append(geo.addCurveLoop(lines))
@@ -158,10 +152,7 @@ class Move:
         if isinstance(part, HalfSpace):
             force = None if part.force is None else self.vector(part.force, names, S * L**2)
             height = None if part.height is None else lambda x: L * part.height(x / L)
-            points, depth = (
-                tuple(L * row for row in part.points),
-                None if part.depth is None else L * part.depth,
-            )
+            points, depth = (tuple(L * row for row in part.points), None if part.depth is None else L * part.depth)
             own = replace(part.material, E=part.material.E * S)
             return replace(part, points=points, height=height, force=force, depth=depth, material=own)
         if isinstance(part, Rigid):
@@ -184,12 +175,7 @@ class Move:
         curves = {name: self._curve(own) for name, own in (part.curve or {}).items()} or None
         material = replace(part.material, E=part.material.E * S)
         return replace(
-            part,
-            mesh=self.mesh(part.mesh),
-            material=material,
-            supports=supports,
-            loads=tuple(loads),
-            curve=curves,
+            part, mesh=self.mesh(part.mesh), material=material, supports=supports, loads=tuple(loads), curve=curves
         )
 
     def _curve(self, curve: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:

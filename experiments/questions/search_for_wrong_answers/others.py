@@ -14,20 +14,9 @@ from contactopt.analytic import contact_modulus, hertz_line, hertz_point, press_
 from contactopt.scenes.discs import extrude, half_disc
 from contactopt.scenes.meshes import graded, tensor_mesh
 from contactopt.scenes.round import cylinder
-from experiments.questions.search_for_wrong_answers.blocks import (
-    Random,
-    friction,
-    material,
-    oblique,
-)
+from experiments.questions.search_for_wrong_answers.blocks import Random, friction, material, oblique
 from experiments.questions.search_for_wrong_answers.compare import Case, Way
-from experiments.questions.search_for_wrong_answers.meshes import (
-    named,
-    outlined,
-    random_move,
-    ring,
-    ticks,
-)
+from experiments.questions.search_for_wrong_answers.meshes import named, outlined, random_move, ring, ticks
 
 
 def scene_of(bodies: list[Any], pair: tuple[str, str], mu: float, **settings: Any) -> Scene:
@@ -90,33 +79,15 @@ def pin(rng: Random) -> Case:
 
         return scene(mesh, **given)
 
-    points = {
-        "pin": [(0.0, (hole + 1) / 2), ((hole + 1) / 2, 0.0)],
-        "bush": [(0.0, -(1 + outer) / 2)],
-    }
-    return Case(
-        "pin in bush",
-        (Way(structured), moved(rng, free)),
-        points,
-        smooth=True,
-        loose=play,
-        strain=1e-3,
-    )
+    points = {"pin": [(0.0, (hole + 1) / 2), ((hole + 1) / 2, 0.0)], "bush": [(0.0, -(1 + outer) / 2)]}
+    return Case("pin in bush", (Way(structured), moved(rng, free)), points, smooth=True, loose=play, strain=1e-3)
 
 
 def fit(rng: Random) -> Case:
     """A press fit: a quarter of two rings against Lame's solution."""
-    bore, outer, d = (
-        float(rng.uniform(0.3, 0.7)),
-        float(rng.uniform(1.4, 2.5)),
-        float(10 ** rng.uniform(-4, -2.5)),
-    )
+    bore, outer, d = (float(rng.uniform(0.3, 0.7)), float(rng.uniform(1.4, 2.5)), float(10 ** rng.uniform(-4, -2.5)))
     shaft, hub, share, mu = material(rng), material(rng), float(rng.uniform(0, 1)), friction(rng)
-    rims, order, sizes = (
-        (1 + share * d, 1 - (1 - share) * d),
-        int(rng.integers(1, 3)),
-        rng.uniform(0.1, 0.2, 2),
-    )
+    rims, order, sizes = ((1 + share * d, 1 - (1 - share) * d), int(rng.integers(1, 3)), rng.uniform(0.1, 0.2, 2))
     given, exact = mortar(rng, order), press_fit(d, bore, 1.0, outer, shaft, hub).peak or 0.0
     sides = (Support("straight x", {"y": 0.0}), Support("straight y", {"x": 0.0}))
 
@@ -132,42 +103,24 @@ def fit(rng: Random) -> Case:
 
         h = sizes / 2**level
         bodies = [
-            Part(
-                "shaft",
-                quarter(bore, rims[0], h[0]),
-                shaft,
-                sides,
-                curve={"outside": circle(rims[0])},
-            ),
+            Part("shaft", quarter(bore, rims[0], h[0]), shaft, sides, curve={"outside": circle(rims[0])}),
             Part("hub", quarter(rims[1], outer, h[1]), hub, sides, curve={"inside": circle(rims[1])}),
         ]
         return scene_of(bodies, ("shaft:outside", "hub:inside"), mu, copies=4, **given)
 
-    return Case(
-        "press fit",
-        ({"pressure 0": exact, "peak 0": exact}, moved(rng, build)),
-        smooth=True,
-        strain=d,
-    )
+    return Case("press fit", ({"pressure 0": exact, "peak 0": exact}, moved(rng, build)), smooth=True, strain=d)
 
 
 def roller(rng: Random) -> Case:
     """A cylinder on a flat body: half of it graded around the contact, or all of it, coarse where surfaces are apart."""
     one, two, mu = material(rng), material(rng), friction(rng)
-    a, wide, high = (
-        float(rng.uniform(0.03, 0.1)),
-        float(rng.uniform(1.5, 4)),
-        float(rng.uniform(1, 3)),
-    )
+    a, wide, high = (float(rng.uniform(0.03, 0.1)), float(rng.uniform(1.5, 4)), float(rng.uniform(1, 3)))
     force, fine, far = (
         np.pi * contact_modulus(one, two) * a**2 / 4,
         float(rng.uniform(0.8, 1.3)),
         float(rng.uniform(0.1, 0.5)),
     )
-    given, sizes = (
-        mortar(rng),
-        {"foundation_width": wide, "foundation_height": high, "force": force},
-    )
+    given, sizes = (mortar(rng), {"foundation_width": wide, "foundation_height": high, "force": force})
 
     def half(level: int) -> Scene:
         return cylinder(radius=1.0, depth=1.0, upper=one, lower=two, mu=mu, elements=6 * 2**level, **sizes)
@@ -238,12 +191,7 @@ def ball(rng: Random) -> Case:
 def exact(rng: Random) -> Case:
     """Round bodies on half-spaces without friction, against Hertz, and a wave on a periodic half-plane, against Westergaard."""
     solid, wave, one, two = rng.random() < 0.4, rng.random() < 0.3, material(rng), material(rng)
-    rigid, radius, a, shift = (
-        wave or rng.random() < 0.4,
-        float(rng.uniform(5, 50)),
-        1.0,
-        rng.uniform(-0.1, 0.1, 2),
-    )
+    rigid, radius, a, shift = (wave or rng.random() < 0.4, float(rng.uniform(5, 50)), 1.0, rng.uniform(-0.1, 0.1, 2))
     modulus, share, wide = (
         contact_modulus(None if rigid else one, two),
         float(rng.uniform(0.1, 0.8)),
@@ -266,18 +214,8 @@ def exact(rng: Random) -> Case:
     else:
         force = np.pi * modulus * a**2 / (4 * radius)
         peak = hertz_line(force, radius, modulus).peak or 0.0
-        mean, reach, bearing = (
-            8 / (3 * np.pi) * peak,
-            a / 2,
-            2 * (gamma(1.25) / gamma(1.75)) ** 2 * a,
-        )
-    known = {
-        "pressure 0": mean,
-        "reach 0": reach,
-        "peak 0": peak,
-        "bearing 0": bearing,
-        "normal 0": force,
-    }
+        mean, reach, bearing = (8 / (3 * np.pi) * peak, a / 2, 2 * (gamma(1.25) / gamma(1.75)) ** 2 * a)
+    known = {"pressure 0": mean, "reach 0": reach, "peak 0": peak, "bearing 0": bearing, "normal 0": force}
 
     def gap(x: np.ndarray) -> np.ndarray:
         if wave:
@@ -301,17 +239,8 @@ def exact(rng: Random) -> Case:
 
 def heights(rng: Random) -> Case:
     """A rigid uneven body on a half-space: as a gap, or as the height of the half-space; with friction."""
-    solid, periodic, mu, own = (
-        rng.random() < 0.4,
-        bool(rng.random() < 0.4),
-        friction(rng),
-        material(rng),
-    )
-    tall, k, phase = (
-        float(10 ** rng.uniform(-4, -3)),
-        rng.integers(1, 4, (4, 2)),
-        rng.uniform(0, 2 * np.pi, 4),
-    )
+    solid, periodic, mu, own = (rng.random() < 0.4, bool(rng.random() < 0.4), friction(rng), material(rng))
+    tall, k, phase = (float(10 ** rng.uniform(-4, -3)), rng.integers(1, 4, (4, 2)), rng.uniform(0, 2 * np.pi, 4))
     force = contact_modulus(None, own) * tall * float(10 ** rng.uniform(-1, 0.3))
     load, axes, first = oblique(rng, mu, force), (0, 1, 2) if solid else (0, 1), 10 if solid else 40
     load = {"z" if solid and name == "y" else name: value for name, value in load.items()}
@@ -330,25 +259,14 @@ def heights(rng: Random) -> Case:
         ground = HalfSpace("ground", own, points, height=height, periodic=periodic, depth=depth)
         return scene_of([body, ground], ("body", "ground"), mu, kind="solid" if solid else "plane-strain")
 
-    ways = (
-        Way(lambda level: build(level, False), axes),
-        moved(rng, lambda level: build(level, True), axes),
-    )
+    ways = (Way(lambda level: build(level, False), axes), moved(rng, lambda level: build(level, True), axes))
     return Case("gap or height of a half-space", ways, smooth=True, loose=20 * tall)
 
 
 def large(rng: Random) -> Case:
     """A rigid profile on a half-plane, and on a body of finite elements that is larger from level to level."""
-    own, mu, radius, bumps = (
-        material(rng),
-        friction(rng),
-        float(rng.uniform(10, 50)),
-        float(rng.uniform(0, 0.5)),
-    )
-    phase, period, share, degree = (
-        *map(float, rng.uniform([0, 0.5, 0.8], [6, 1.5, 1.2])),
-        int(rng.integers(1, 3)),
-    )
+    own, mu, radius, bumps = (material(rng), friction(rng), float(rng.uniform(10, 50)), float(rng.uniform(0, 0.5)))
+    phase, period, share, degree = (*map(float, rng.uniform([0, 0.5, 0.8], [6, 1.5, 1.2])), int(rng.integers(1, 3)))
     load = oblique(rng, mu, np.pi * contact_modulus(None, own) / (4 * radius))
 
     def gap(x: np.ndarray) -> np.ndarray:
@@ -364,10 +282,7 @@ def large(rng: Random) -> Case:
         ends = [(-c, -c, "bottom"), (c, -c, "right"), (c, 0, "top"), (2, 0, "over"), (1.3, 0, "over"), (-1.3, 0, "over"),
                 (-2, 0, "top"), (-c, 0, "left")]  # fmt: skip
         mesh = outlined([(x, y, c / 5 if abs(x) > 5 else h * (1 + (abs(x) > 1.5)), name) for x, y, name in ends])
-        part, body = (
-            Part("ground", mesh, own, (Support("bottom"),)),
-            Rigid("body", (0.0, 1.0), gap, load),
-        )
+        part, body = (Part("ground", mesh, own, (Support("bottom"),)), Rigid("body", (0.0, 1.0), gap, load))
         return scene_of([body, part], ("body", "ground:over"), mu, degree=degree)
 
     second = Way(finite)
