@@ -19,7 +19,7 @@ TOL = 1e-9  # of the certificate
 ROUNDING = 1e-5  # of a quantity's scale: what the certificate leaves open
 SHARP = 1e-4  # between one mesh and the same mesh moved
 SLOWEST = 0.9  # largest ratio of the differences between levels that an estimate believes
-AROUND = 20  # nodes in the plane, and the square of it in space, among which a value at a point is fitted
+AROUND = {2: 20, 3: 120}  # nodes among which a value at a point is fitted, in the plane and in space
 
 Values = dict[str, float]
 
@@ -120,19 +120,19 @@ def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
         for j, point in enumerate(case.points.get(body.name, [])):
             mean = body.stress[:, :3].sum(axis=1) / 3
             values = np.column_stack([moved_by.T, body.von_mises / S, mean / S])
-            read_off = fitted(at - np.array(point)[:, None], values)
+            read_off = fitted(at - np.array(point)[:, None], values, AROUND[len(body.mesh.p)])
             names = [f"moved {axis}" for axis in range(len(axes))] + ["von_mises", "mean_stress"]
             found |= {f"{name} {body.name} {j}": float(value) for name, value in zip(names, read_off)}
     return found
 
 
-def fitted(offsets: np.ndarray, values: np.ndarray) -> np.ndarray:
+def fitted(offsets: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     """Values (m,) at a point of fields (n, m) at nodes, whose offsets (dim, n) from it are given.
 
-    A quadratic is fitted with weights that fall smoothly to zero. It knows no axes, so that turning changes nothing.
+    A quadratic is fitted among `count` nodes with weights that fall smoothly to zero. It knows no axes, so that turning changes nothing.
     """
     distance = np.linalg.norm(offsets, axis=0)
-    reach = np.sort(distance)[min(AROUND ** (len(offsets) - 1), len(distance) - 1)]
+    reach = np.sort(distance)[min(count, len(distance) - 1)]
     near = distance < reach
     x, weights = offsets[:, near] / reach, (1 - distance[near] / reach)[:, None]
     pairs = [x[i] * x[j] for i in range(len(x)) for j in range(i, len(x))]

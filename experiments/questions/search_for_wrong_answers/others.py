@@ -281,7 +281,7 @@ def large(rng: Random) -> Case:
         c, h = 15.0 * 2**level, share / (8 * 2**level)
         ends = [(-c, -c, "bottom"), (c, -c, "right"), (c, 0, "top"), (2, 0, "over"), (1.3, 0, "over"), (-1.3, 0, "over"),
                 (-2, 0, "top"), (-c, 0, "left")]  # fmt: skip
-        mesh = outlined([(x, y, c / 5 if abs(x) > 5 else h * (1 + (abs(x) > 1.5)), name) for x, y, name in ends])
+        mesh = outlined([(x, y, 3.0 if abs(x) > 5 else h * (1 + (abs(x) > 1.5)), name) for x, y, name in ends])
         part, body = (Part("ground", mesh, own, (Support("bottom"),)), Rigid("body", (0.0, 1.0), gap, load))
         return scene_of([body, part], ("body", "ground:over"), mu, degree=degree)
 
