@@ -115,12 +115,14 @@ def read(way: Way, level: int, case: Case, moved: bool = True) -> Values:
         if case.smooth:
             found[f"peak {i}"] = (result.summary["pressure"] or table["max_pressure"]) / S
     for body in result.fields:
-        at = move.back(body.mesh.p)[axes] / L
+        at = move.back(body.mesh.p) / L
+        at = at if axes == [0, 2] else at[axes]  # a section lies at y = 0, a slab is alike along z
         moved_by = move.back(body.displacement)[axes] / L
         for j, point in enumerate(case.points.get(body.name, [])):
             mean = body.stress[:, :3].sum(axis=1) / 3
             values = np.column_stack([moved_by.T, body.von_mises / S, mean / S])
-            read_off = fitted(at - np.array(point)[:, None], values, AROUND[len(body.mesh.p)])
+            target = np.insert(point, 1, 0.0) if len(at) > len(point) else np.array(point)
+            read_off = fitted(at - target[:, None], values, AROUND[len(body.mesh.p)])
             names = [f"moved {axis}" for axis in range(len(axes))] + ["von_mises", "mean_stress"]
             found |= {f"{name} {body.name} {j}": float(value) for name, value in zip(names, read_off)}
     return found
