@@ -27,6 +27,7 @@ from contactopt.material import Material, lame
 from contactopt.problem.chart import Chart
 from contactopt.problem.convolution import Convolution, Kernel, embedding
 from contactopt.problem.operators import Product
+from contactopt.scenes.contact import SIDES
 from contactopt.scenes.scene import HalfSpace, Scene
 
 
@@ -344,6 +345,12 @@ def assemble_half_space(scene: Scene, part: HalfSpace, elements: int, zone: floa
             f"half-space '{part.name}': scene '{scene.name}' must be 'plane-strain' or 'solid' with copies = 1, because the "
             "forces between its points know no symmetry."
         )
-    outward = -1.0 if part is scene.upper else 1.0
+    sides = {side for pair in scene.pairs for side, name in zip(SIDES, pair.bodies) if name == part.name}
+    if len(sides) > 1:
+        raise InputError(
+            f"half-space '{part.name}' is the upper body of one contact and the lower one of another; give all of its contacts "
+            "the same side, because it fills one half of space."
+        )
+    outward = -1.0 if "upper" in sides else 1.0
     thickness = scene.thickness if scene.dim == 2 else 1.0
     return HalfSpaceBody(part, scene.components, part.ticks(elements, zone, scene.dim - 1), outward, thickness)

@@ -69,9 +69,9 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     tuple
         The dimensionless problem, and the Scales that take its reactions and multipliers back.
     """
-    d = diagonal(problem.Q)
-    columns = np.linalg.norm(problem.V, axis=0)
-    total = np.abs(problem.V).sum(axis=0)
+    d, V = diagonal(problem.Q), without_rounding(problem.V)
+    columns = np.linalg.norm(V, axis=0)
+    total = np.abs(V).sum(axis=0)
     resultant = np.divide(np.abs(problem.s), total, out=np.zeros(len(problem.s)), where=total > 0)
     balanced = float(resultant.max(initial=0.0))
     if np.any(d > 0):
@@ -95,11 +95,31 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
         problem,
         Q=Q,
         q=problem.q / length,
-        V=problem.V / columns,
+        V=V / columns,
         s=problem.s / (columns * force),
         law=problem.law.scaled(force),
     )
     return scaled, Scales(force, length, length / columns)
+
+
+def without_rounding(V: np.ndarray) -> np.ndarray:
+    """Motions without the entries that are rounding beside the largest of their column.
+
+    Normals of a flat surface that are off by rounding would let forces without friction hold a body
+    along it: by motions without bound, which the certificate does not see.
+
+    Parameters
+    ----------
+    V
+        (n, p) motions.
+
+    Returns
+    -------
+    ndarray
+        (n, p) motions, with zeros in place of rounding.
+    """
+    size = np.abs(V)
+    return np.where(size > NOISE * size.max(axis=0, initial=0.0), V, 0.0)
 
 
 def immovable(problem: InterfaceProblem) -> np.ndarray:

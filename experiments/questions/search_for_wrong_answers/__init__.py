@@ -1,0 +1,1 @@
+"""Two ways to one answer, which share neither mesh nor coupling, for many random scenes."""

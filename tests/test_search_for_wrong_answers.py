@@ -1,0 +1,59 @@
+"""Two ways to one answer: the search finds what is wrong, and nothing where nothing is; what it found stays mended."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contactopt import Contact, HalfSpace, InputError, InterfaceProblem, Material, Scene, run, solve
+from experiments.questions.search_for_wrong_answers.__main__ import verdicts
+from experiments.questions.search_for_wrong_answers.compare import judge
+from experiments.questions.search_for_wrong_answers.others import exact
+
+MATERIAL, ROW = Material(5.0, 0.3), np.linspace(-3, 3, 31)
+
+
+def ball(**force: float) -> HalfSpace:
+    return HalfSpace("ball", MATERIAL, (ROW,), height=lambda x: -(x[0] ** 2) / 40, **force)
+
+
+def test_ten_scenes_of_eight_kinds_have_one_answer_by_two_ways():
+    found = [next(verdicts(seed, seed + 1))[0] for seed in (0, 5, 6, 8, 10, 11, 13, 15, 29, 31)]
+    assert len({verdict.family for verdict in found}) == 8
+    assert not [(verdict.seed, verdict.wrong) for verdict in found if verdict.wrong]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_an_answer_that_is_five_percent_wrong_is_found(seed):
+    case = exact(np.random.default_rng(seed))
+    known, way = case.ways
+    wrong = replace(case, ways=({"pressure 0": 1.05 * known["pressure 0"]}, way))
+    assert "pressure 0" in judge(seed, wrong).wrong[0]
+
+
+def test_an_upper_half_space_lies_above_in_scenes_of_many_bodies_too():
+    pressed, flat = ball(force={"y": -0.05}), HalfSpace("flat", MATERIAL, (ROW,))
+    short = run(Scene("short", pressed, flat, 0.0), figures=())
+    long = run(Scene("long", bodies=(pressed, flat), contacts=(Contact("ball", "flat", 0.0),)), figures=())
+    assert np.allclose(long.pressure, short.pressure, atol=1e-9)
+    assert long.pressure[len(ROW) // 2] == long.pressure.max()
+
+
+def test_a_half_space_on_both_sides_is_refused():
+    third = HalfSpace("third", MATERIAL, (ROW,))
+    pairs = (Contact("ball", "flat", 0.0), Contact("third", "ball", 0.0))
+    scene = Scene("three", bodies=(ball(), HalfSpace("flat", MATERIAL, (ROW,)), third), contacts=pairs)
+    with pytest.raises(InputError, match="upper body of one contact"):
+        run(scene, figures=())
+
+
+def test_rounding_in_the_normals_does_not_hold_a_body_without_friction():
+    """The motion along the surface would be 1e28, and the forces those of another problem."""
+    rng, k = np.random.default_rng(0), 12
+    A = rng.normal(size=(2 * k, 2 * k))
+    V = np.zeros((k, 2, 2))
+    V[:, 0, 0] = V[:, 1, 1] = 1.0
+    plain = solve(InterfaceProblem(A @ A.T / k + np.eye(2 * k), np.zeros((k, 2)), 0.0, V.reshape(-1, 2), [-1.0, 0.0]))
+    V[:, 0, 1] = 1e-30 * rng.normal(size=k)
+    rounded = solve(InterfaceProblem(A @ A.T / k + np.eye(2 * k), np.zeros((k, 2)), 0.0, V.reshape(-1, 2), [-1.0, 0.0]))
+    assert rounded.solved and np.allclose(rounded.multipliers, plain.multipliers, atol=1e-8)
