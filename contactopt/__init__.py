@@ -15,34 +15,34 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from contactopt.analysis.diagnosis import Diagnosis, diagnose
-    from contactopt.analysis.enumeration import all_solutions
-    from contactopt.analysis.paths import PathResult, follow
     from contactopt.analytic import Reference
     from contactopt.bodies.fields import Fields
+    from contactopt.coupling.reduction import reduce, reduce_bodies
     from contactopt.derivatives.design import Design, design
     from contactopt.derivatives.fit import Fit, fit
     from contactopt.derivatives.gradient import gradient
     from contactopt.derivatives.interface import sensitivity
     from contactopt.errors import BackendError, InputError
-    from contactopt.interface.reduction import reduce, reduce_bodies
     from contactopt.material import Material
+    from contactopt.meshes.mesh_files import load_mesh
+    from contactopt.methods.diagnosis import Diagnosis, diagnose
+    from contactopt.methods.driver import solve
+    from contactopt.methods.enumeration import all_solutions
     from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual, siconos_residual
     from contactopt.problem.transfer import transfer
     from contactopt.runner import Result, run
     from contactopt.scenes.contact import Contact
-    from contactopt.scenes.mesh_files import load_mesh
     from contactopt.scenes.scene import BodyForce, HalfSpace, Part, Plate, Rigid, Scene, Support, Traction
     from contactopt.simplification.findings import Simplification, Simplified
     from contactopt.simplification.search import simplify
-    from contactopt.solving.driver import solve
+    from contactopt.solving.paths import PathResult, follow
 
 # name -> the module that it stands in
 _HOMES = {
     "analytic": ("Reference",),
-    "analysis.diagnosis": ("Diagnosis", "diagnose"),
-    "analysis.enumeration": ("all_solutions",),
-    "analysis.paths": ("PathResult", "follow"),
+    "methods.diagnosis": ("Diagnosis", "diagnose"),
+    "methods.enumeration": ("all_solutions",),
+    "solving.paths": ("PathResult", "follow"),
     "simplification.findings": ("Simplification", "Simplified"),
     "simplification.search": ("simplify",),
     "derivatives.design": ("Design", "design"),
@@ -51,15 +51,15 @@ _HOMES = {
     "derivatives.interface": ("sensitivity",),
     "errors": ("BackendError", "InputError"),
     "bodies.fields": ("Fields",),
-    "interface.reduction": ("reduce", "reduce_bodies"),
+    "coupling.reduction": ("reduce", "reduce_bodies"),
     "problem": ("InterfaceProblem", "Solution", "Status", "natural_map_residual", "siconos_residual"),
     "problem.transfer": ("transfer",),
     "runner": ("Result", "run"),
     "material": ("Material",),
     "scenes.contact": ("Contact",),
-    "scenes.mesh_files": ("load_mesh",),
+    "meshes.mesh_files": ("load_mesh",),
     "scenes.scene": ("BodyForce", "HalfSpace", "Part", "Plate", "Rigid", "Scene", "Support", "Traction"),
-    "solving.driver": ("solve",),
+    "methods.driver": ("solve",),
 }
 _MODULES = {
     "analytic": "analytic",

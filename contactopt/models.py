@@ -14,7 +14,7 @@ InterfaceProblem, dimensionless or not (backends want it dimensionless), and ret
 
 Discs and cones become polygons and pyramids with `facets`, which makes the last four QPs also in 3D.
 
-All are convex because Q is positive semidefinite; that is the caller's promise (contactopt.solving.backends.conic checks it by
+All are convex because Q is positive semidefinite; that is the caller's promise (contactopt.methods.backends.conic checks it by
 Cholesky), since cvxpy's own test of it fails at random on large matrices.
 """
 

@@ -12,27 +12,27 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from contactopt.analysis.limits import Limits
-from contactopt.analysis.paths import PathResult, solve_states
-from contactopt.analysis.progress import resident_memory
-from contactopt.analysis.quantities import Reading, approach, pressure_reading, stick_width, width
-from contactopt.analysis.resolution import remarks
-from contactopt.analysis.resultants import mirrors, tables
-from contactopt.analysis.solve_scene import Options, Solved
-from contactopt.analysis.validity import validity
 from contactopt.bodies.ranks import Team, spread
 from contactopt.cards import card, count, line
+from contactopt.coupling.back_to_bodies import Fields, recover
+from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.figures.output import PAGE, draw, earlier_files, squeeze, write
 from contactopt.figures.style import FORMATS
-from contactopt.files import check_folder, whole_folder
-from contactopt.interface.recovery import Fields, recover
-from contactopt.interface.reduction import Reduction
+from contactopt.files.writing import check_folder, whole_folder
+from contactopt.linear.operators import InterfaceOperator
+from contactopt.methods import default_method, find_method
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.problem.operators import InterfaceOperator
+from contactopt.readings.quantities import Reading, approach, pressure_reading, stick_width, width
+from contactopt.readings.resolution import remarks
+from contactopt.readings.resultants import mirrors, tables
+from contactopt.readings.validity import validity
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Part, Scene
-from contactopt.solving.methods import default_method, find_method
+from contactopt.solving.limits import Limits
+from contactopt.solving.paths import PathResult, solve_states
+from contactopt.solving.progress import resident_memory
+from contactopt.solving.solve_scene import Options, Solved
 
 if TYPE_CHECKING:
     from contactopt.accuracy.estimate import Estimate
@@ -47,7 +47,7 @@ PATH_KEYS = ("approach", "shift", "shear_force", "contact_half_width", "stick_ha
 class Result:
     """A solved scene. `summary` is what summary.json holds; `zones` the half-widths of the contact-zone loop.
 
-    `summary["seconds"]` holds the wall time [s] of each phase: those of the solution (see contactopt.analysis.solve_scene),
+    `summary["seconds"]` holds the wall time [s] of each phase: those of the solution (see contactopt.solving.solve_scene),
     `recover` of the fields, `figures` and `files` where some were asked for, and `total` of the whole run.
 
     `path` holds all states of a scene that has a load path; the rest of the result is then that of the last state.
@@ -90,7 +90,7 @@ class Result:
     def view(self, file: str | Path | None = None, show: bool = True) -> Path:
         """Write the result as one page to explore in a browser, and open it.
 
-        The page needs no network and nothing but the browser (contactopt.figures.page says what is on it).
+        The page needs no network and nothing but the browser (contactopt.figures.view_page says what is on it).
 
         Parameters
         ----------
@@ -108,7 +108,7 @@ class Result:
         import tempfile
         import webbrowser
 
-        from contactopt.figures.page import write_page
+        from contactopt.figures.view_page import write_page
 
         if file is None:
             file = Path(tempfile.mkdtemp(prefix="contactopt-")) / PAGE
@@ -168,7 +168,7 @@ def run(
         name ends in .toml; or a Scene
     out : folder for the files; None: nothing is written
     method, normal, tangential : names; by default `auto`, or `alternating` if a backend is named
-    preconditioner : a name in contactopt.solving.preconditioners, of methods that take products with Q; it selects
+    preconditioner : a name in contactopt.methods.preconditioners, of methods that take products with Q; it selects
         Q = 'implicit'
     Q, solver : form of Q and solver of the bodies, see reduce(); 'auto' by default
     tol : bound on the natural-map residual; 1e-8 by default
@@ -176,7 +176,7 @@ def run(
     accuracy : bound on the estimated relative error of `quantity`. Meshes are then refined until it is met, or until a
         sentence in `Result.estimate` says why not; `elements` only scales the first mesh
     quantity : a name of contactopt.derivatives.outputs; of one of several pairs of surfaces 'NAME:PAIR'; or one of
-        contactopt.analysis.places, such as 'von_mises:BODY:BOUNDARY' or 'pressure@X,Y'
+        contactopt.readings.places, such as 'von_mises:BODY:BOUNDARY' or 'pressure@X,Y'
     adaptive : whether meshes are refined only where the quantity needs it (contactopt.accuracy), each body by itself, and not
         everywhere; quadrilaterals become triangles
     max_unknowns, time_limit, max_memory : bounds on the search for the accuracy: unknowns of a mesh, seconds and GB of all. No
@@ -261,7 +261,7 @@ def _wanted_files(figures: Sequence[str], html: bool) -> tuple[str, ...]:
     if isinstance(figures, str) or not set(figures) <= set(FORMATS):
         raise InputError(f"figures must be formats of {', '.join(FORMATS)}, or () for none; got {figures!r}.")
     if html:
-        from contactopt.figures.page import check_installed
+        from contactopt.figures.view_page import check_installed
 
         check_installed()
     return (*figures, *(["html"] if html else []))
@@ -304,7 +304,7 @@ def _finish(
         made = replace(made, summary=summary | _seconds(seconds, start))
         (folder / "summary.json").write_text(json.dumps(made.summary, indent=2) + "\n")
         if "html" in files:
-            from contactopt.figures.page import write_page
+            from contactopt.figures.view_page import write_page
 
             write_page(folder, folder / PAGE)
     return made

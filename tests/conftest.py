@@ -5,7 +5,7 @@ import pytest
 from skfem import MeshQuad
 
 from contactopt import InterfaceProblem, Material, Part, Plate, Scene, Support, reduce, scenes
-from contactopt.scenes.meshes import rename, tensor_mesh
+from contactopt.meshes.structured import rename, tensor_mesh
 
 MATERIAL = Material(5.0, 0.3)
 

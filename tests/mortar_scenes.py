@@ -11,12 +11,12 @@ import skfem
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce_bodies
 from contactopt.bodies.elements import face_nodes
-from contactopt.interface.coupling import COUPLINGS, Coupling
-from contactopt.interface.faces import faces_of
-from contactopt.interface.mortar import Mortar, mortar
-from contactopt.interface.reduction import Reduction
-from contactopt.interface.surfaces import couple_surfaces
-from contactopt.scenes.meshes import rename, tensor_mesh
+from contactopt.coupling.coupling import COUPLINGS, Coupling
+from contactopt.coupling.faces import faces_of
+from contactopt.coupling.mortar import Mortar, mortar
+from contactopt.coupling.mortar_surfaces import couple_surfaces
+from contactopt.coupling.reduction import Reduction
+from contactopt.meshes.structured import rename, tensor_mesh
 
 
 @dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contactopt import BodyForce, Contact, Material, Part, Rigid, Scene
-from contactopt.scenes.meshes import rename, tensor_mesh
+from contactopt.meshes.structured import rename, tensor_mesh
 
 
 def block(low, high, cells):

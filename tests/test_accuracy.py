@@ -9,16 +9,16 @@ from skfem import MeshQuad
 from contactopt import Contact, InputError, Plate, Rigid, cli, run, scenes, solve
 from contactopt.accuracy import everywhere, loop, refine
 from contactopt.accuracy.everywhere import remainder
-from contactopt.analysis.limits import Limits
-from contactopt.analysis.quantities import READINGS, Reading, at_rim, peak_pressure, value_of
-from contactopt.analysis.zone import solve_zone
-from contactopt.bodies.local_refinement import split
-from contactopt.bodies.refinement import split_scene
+from contactopt.coupling.reduction import reduce_bodies
 from contactopt.derivatives.outputs import ROWS, Quantity
-from contactopt.interface.reduction import reduce_bodies
 from contactopt.material import Material
-from contactopt.scenes.meshes import rename, tensor_mesh
+from contactopt.meshes.local_refinement import split
+from contactopt.meshes.structured import rename, tensor_mesh
+from contactopt.readings.quantities import READINGS, Reading, at_rim, peak_pressure, value_of
+from contactopt.scenes.refined_scenes import split_scene
 from contactopt.scenes.scene import Part, Support
+from contactopt.solving.limits import Limits
+from contactopt.solving.zone import solve_zone
 from experiments.questions.accuracy.half_space import flat, indenter
 from experiments.questions.accuracy.measured import effectivity, exact
 

@@ -11,13 +11,13 @@ from contactopt import InputError, Part, Plate, Rigid, Scene, Support, run
 from contactopt.accuracy import refine
 from contactopt.accuracy.corners import filled, re_entrant
 from contactopt.accuracy.indicators import element_errors, pressure_errors
-from contactopt.analysis.limits import Limits
-from contactopt.analysis.solve_scene import solve_scene
-from contactopt.bodies.local_refinement import bent, boundary_curve
 from contactopt.cli import main
+from contactopt.coupling.reduction import reduce_bodies
 from contactopt.derivatives.outputs import find_quantity
-from contactopt.interface.reduction import reduce_bodies
+from contactopt.meshes.local_refinement import bent, boundary_curve
 from contactopt.scenes import make_scene
+from contactopt.solving.limits import Limits
+from contactopt.solving.solve_scene import solve_scene
 from experiments.questions.adaptivity.parts import ball as gmsh_ball
 
 

@@ -9,11 +9,11 @@ from turned import moved, turn
 from contactopt import InputError, Part, Rigid, Scene, Support, reduce, scenes, solve
 from contactopt.accuracy import refine
 from contactopt.accuracy.indicators import element_errors
-from contactopt.analysis.limits import Limits
-from contactopt.analysis.solve_scene import solve_scene
-from contactopt.bodies.local_refinement import boundary_curve, divide, simplices
 from contactopt.derivatives.outputs import find_quantity
+from contactopt.meshes.local_refinement import boundary_curve, divide, simplices
 from contactopt.scenes import make_scene
+from contactopt.solving.limits import Limits
+from contactopt.solving.solve_scene import solve_scene
 
 
 def locally(scene, *arguments, **limits):
@@ -97,7 +97,7 @@ def test_stress_errors_vanish_for_uniform_stress_and_fall_with_the_mesh():
 
 
 def reduce_body(scene):
-    from contactopt.interface.reduction import reduce_bodies
+    from contactopt.coupling.reduction import reduce_bodies
 
     return reduce_bodies(scene).bodies[0]
 

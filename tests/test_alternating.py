@@ -3,8 +3,8 @@ import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
+from contactopt.methods.alternating import Alternating
 from contactopt.problem.laws.bilateral import Bilateral
-from contactopt.solving.methods.alternating import Alternating
 
 CYCLING = (-10.0, 1.0)
 

@@ -6,7 +6,7 @@ import skfem
 
 import contactopt
 from contactopt import InputError, Material, analytic, scenes
-from contactopt.scenes.polar import disc, right_half_disc, ring
+from contactopt.meshes.polar import disc, right_half_disc, ring
 
 
 def shape_error(modulus, radius, clearance, exact):

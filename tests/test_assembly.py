@@ -27,8 +27,8 @@ from contactopt import (
     solve,
     transfer,
 )
-from contactopt.analysis.resultants import holder_resultants, pair_resultants, tables
 from contactopt.problem import alone
+from contactopt.readings.resultants import holder_resultants, pair_resultants, tables
 
 SOFT = Material(1000.0, 0.3)
 

@@ -3,9 +3,9 @@ import pytest
 from conftest import one_contact
 
 from contactopt import BackendError, InputError, natural_map_residual, solve
-from contactopt.solving.backends import CONIC, QP, Backend, find
-from contactopt.solving.backends.conic import DiscSOCP
-from contactopt.solving.backends.qp import BoxQP
+from contactopt.methods.backends import CONIC, QP, Backend, find
+from contactopt.methods.backends.conic import DiscSOCP
+from contactopt.methods.backends.qp import BoxQP
 
 REQUIRED_QP = ("clarabel", "daqp", "ecos", "highs", "osqp", "piqp", "proxqp", "quadprog", "scs")
 REQUIRED_CONIC = ("clarabel", "ecos", "scs")
@@ -76,7 +76,7 @@ def test_a_backend_that_lies_is_asked_again_and_then_reported(monkeypatch, punch
     """Whatever it claims, what comes back is checked against the problem: here a vector that no crossover can save."""
     asked = []
     fake(monkeypatch, lambda p: asked.append(p) or np.full(len(p.q), 5.0))
-    monkeypatch.setattr("contactopt.solving.kernels.semismooth.STEPS", 1)
+    monkeypatch.setattr("contactopt.methods.kernels.semismooth.STEPS", 1)
     solution = solve(punch, "alternating", max_iterations=3)
     assert solution.status.label == "backend_failed" and "proxqp" in solution.message and "twice" in solution.message
     assert len(asked) == 2

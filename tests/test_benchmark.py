@@ -323,7 +323,7 @@ from dataclasses import dataclass
 import numpy as np
 from contactopt import InterfaceProblem
 from contactopt.benchmark import method, problem
-from contactopt.solving.methods.newton import Newton
+from contactopt.methods.newton import Newton
 
 @method
 @dataclass(frozen=True)
@@ -362,7 +362,7 @@ def test_entry_points(tmp_path, monkeypatch):
     info = tmp_path / "theirs-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[contactopt.solving.methods]\ntheirs = theirs:theirs\n")
+    (info / "entry_points.txt").write_text("[contactopt.methods]\ntheirs = theirs:theirs\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     table = run(tmp_path, SMALL.replace('["auto", "nsgs"]', '"theirs"'))

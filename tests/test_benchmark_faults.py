@@ -19,11 +19,11 @@ from contactopt.benchmark import pool, problems, process, store, worker
 from contactopt.benchmark.catalogue import read_catalogue
 from contactopt.benchmark.experiment import read_experiment
 from contactopt.benchmark.measure import Task
-from contactopt.benchmark.report import read_layout
+from contactopt.benchmark.reports import read_layout
 from contactopt.benchmark.runs import MethodSpec, Run
 from contactopt.benchmark.store import lines
 from contactopt.cli import main
-from contactopt.solving.backends import child
+from contactopt.methods.backends import child
 from tests.test_benchmark import SMALL, count, run, written
 
 BAD_NAMES = [
@@ -122,7 +122,7 @@ from contactopt import Solution, Status
 from contactopt.benchmark import method
 
 def right(problem):
-    from contactopt.solving.driver import solve
+    from contactopt.methods.driver import solve
     return solve(problem, tol=1e-10).reactions
 
 @method

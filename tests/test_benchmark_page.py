@@ -5,7 +5,7 @@ import pytest
 from browser import CHROMIUM, Browser
 
 from contactopt import InputError
-from contactopt.benchmark.page import refusals, report_campaign
+from contactopt.benchmark.report_page import refusals, report_campaign
 from contactopt.benchmark.store import load, save
 from contactopt.cli import main
 from tests.test_benchmark import SMALL, written

@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import contactopt.solving.driver
+import contactopt.methods.driver
 from contactopt import InputError, benchmark
-from contactopt.benchmark import figures, tables
-from contactopt.benchmark.figures import fitted_exponent
-from contactopt.benchmark.report import read_layout
+from contactopt.benchmark import report_figures as figures
+from contactopt.benchmark import tables
+from contactopt.benchmark.report_figures import fitted_exponent
+from contactopt.benchmark.reports import read_layout
 from contactopt.benchmark.store import COLUMNS
 from contactopt.cli import main
 from tests.test_benchmark import SMALL, written
@@ -189,7 +190,7 @@ def test_a_report_is_rebuilt_without_solving(reported, monkeypatch):
     def forbidden(*arguments, **settings):
         raise AssertionError("a report must not solve")
 
-    monkeypatch.setattr(contactopt.solving.driver, "solve", forbidden)
+    monkeypatch.setattr(contactopt.methods.driver, "solve", forbidden)
     assert main(["report", "--experiments", "campaigns"]) == 0
     again = Path("reports/small/report.md").read_text()
     assert again == text and "1. 12 runs were made." in text and "What it is." in text

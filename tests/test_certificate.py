@@ -174,7 +174,7 @@ class _Endless:
 
 def test_a_proof_that_there_is_no_solution_ends_a_method_that_would_go_on(monkeypatch):
     clock = [0.0]
-    monkeypatch.setattr("contactopt.solving.driver.time.perf_counter", lambda: clock[0])
+    monkeypatch.setattr("contactopt.methods.driver.time.perf_counter", lambda: clock[0])
     overlapping = NOT_SOLVABLE["squeezed from both sides"]
     solution = solve(overlapping, _Endless(clock))
     assert solution.status is Status.INFEASIBLE and solution.proof is not None

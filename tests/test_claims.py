@@ -11,9 +11,9 @@ from contactopt import InputError, Part, Plate, Rigid, Scene, Support, scenes
 from contactopt.accuracy import loop, refine
 from contactopt.accuracy.marking import balanced, divisible, overlooked
 from contactopt.accuracy.polygon import chords_of, flatter
-from contactopt.analysis.quantities import pressure_reading, width_reading
-from contactopt.analysis.solve_scene import solve_scene
+from contactopt.readings.quantities import pressure_reading, width_reading
 from contactopt.scenes import make_scene
+from contactopt.solving.solve_scene import solve_scene
 
 
 def block(cells=8, wide=4.0, high=2.0, **changes):

@@ -49,7 +49,7 @@ def test_quiet_says_results_only_and_verbose_says_the_steps(tmp_path, capsys):
     printed = capsys.readouterr()
     assert not printed.err and "solved" in printed.out
     done = subprocess.run([sys.executable, "-m", "contactopt", *arguments, "-v"], capture_output=True, text=True)
-    assert done.returncode == 0 and "contactopt.analysis.solve_scene: punch-2d: 4 elements, solved" in done.stderr
+    assert done.returncode == 0 and "contactopt.solving.solve_scene: punch-2d: 4 elements, solved" in done.stderr
 
 
 def test_figures_are_written_in_the_formats_asked_for_and_old_ones_go(tmp_path):

@@ -5,10 +5,10 @@ import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
-from contactopt.analysis.enumeration import all_solutions
+from contactopt.methods.complementarity import Lemke, complementarity_problem, lemke
+from contactopt.methods.enumeration import all_solutions
 from contactopt.problem import dimensionless
 from contactopt.problem.laws.bilateral import Bilateral
-from contactopt.solving.methods.complementarity import Lemke, complementarity_problem, lemke
 
 
 def random_problem(seed: int, mu: float, plate: bool = False, contacts: int = 3) -> InterfaceProblem:

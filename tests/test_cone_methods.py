@@ -6,11 +6,11 @@ from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, fclib, natural_map_residual, reduce, scenes, solve
 from contactopt.errors import BackendError
+from contactopt.methods.backends.direct import CoulombSOCP
+from contactopt.methods.cone import AcaryCadoux, Relaxation, cone_program
 from contactopt.problem import dimensionless
 from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative
 from contactopt.problem.laws.bilateral import Bilateral
-from contactopt.solving.backends.direct import CoulombSOCP
-from contactopt.solving.methods.cone import AcaryCadoux, Relaxation, cone_program
 
 FCLIB = Path(__file__).parents[2] / "shared" / "fclib"
 FILES = ["Box_Stacks-i0035-31-0", "CubeH8", "LMGC_100_PR_PerioBox-i00361-60-03000", "local_problem_test"]

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, natural_map_residual, reduce, reduce_bodies, scenes, solve
-from contactopt.analysis import progress
-from contactopt.analysis.solve_scene import Options, solve_scene
 from contactopt.bodies.solvers.multigrid import MultigridSolver, conjugate_gradients
+from contactopt.linear.flexible_gmres import flexible_gmres
+from contactopt.linear.stacked import Stacked, norm
+from contactopt.methods.kernels.coupled_newton import Coupled, State, in_equilibrium
 from contactopt.problem.certificate import Moved
 from contactopt.problem.laws import LAWS
 from contactopt.problem.laws.coulomb import Coulomb
-from contactopt.problem.stacked import Stacked, norm
 from contactopt.scenes import make_scene
-from contactopt.solving.kernels.coupled import Coupled, State, in_equilibrium
-from contactopt.solving.kernels.flexible import flexible_gmres
+from contactopt.solving import progress
+from contactopt.solving.solve_scene import Options, solve_scene
 
 SMALL = {"punch-2d": 16, "punch-3d": 4, "sphere": 8, "cattaneo-3d": 3, "cylinder-2d": 8}
 

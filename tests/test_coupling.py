@@ -10,14 +10,14 @@ import turned
 from conftest import MATERIAL, block, two_blocks
 
 from contactopt import InputError, InterfaceProblem, Part, Rigid, Scene, Support, reduce, reduce_bodies, scenes, solve
-from contactopt.analysis.paths import follow
-from contactopt.analysis.quantities import elastic_energy
 from contactopt.bodies import BODIES
-from contactopt.bodies.concurrency import each
 from contactopt.bodies.rigid import RigidBody
-from contactopt.interface import coupling, matching
-from contactopt.interface.coupling import COUPLINGS, Coupling
-from contactopt.scenes.meshes import rename, tensor_mesh
+from contactopt.coupling import coupling, matching
+from contactopt.coupling.coupling import COUPLINGS, Coupling
+from contactopt.linear.concurrency import each
+from contactopt.meshes.structured import rename, tensor_mesh
+from contactopt.readings.quantities import elastic_energy
+from contactopt.solving.paths import follow
 
 
 def renumbered(mesh, seed: int):
@@ -254,7 +254,7 @@ def test_an_explicit_operator_costs_no_product(monkeypatch):
 
 
 def test_a_large_array_is_announced_and_a_huge_one_refused(monkeypatch, caplog):
-    from contactopt.problem import operators
+    from contactopt.linear import operators
 
     scene = scenes.flat_punch(2, elements=4)  # 5 contacts: 10 x 10 entries, 800 bytes
     monkeypatch.setattr(operators, "NOTABLE_BYTES", 800)
@@ -305,7 +305,7 @@ def test_a_surface_is_asked_for_by_its_name():
 
 def test_a_pin_in_a_bush_in_space():
     """Extruded rings in any position: gaps along the radius, frames that are orthonormal and right-handed."""
-    from contactopt.scenes.discs import extrude
+    from contactopt.meshes.discs import extrude
 
     def body(inner, outer, contact, support, R):
         plane = turned.ring(inner, outer, 2, 24)

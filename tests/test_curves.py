@@ -6,8 +6,8 @@ import skfem
 from conftest import MATERIAL
 
 from contactopt import InputError, Part, Rigid, Scene, Support, reduce
-from contactopt.bodies.elements import straight
-from contactopt.bodies.local_refinement import (
+from contactopt.meshes.cells import straight
+from contactopt.meshes.local_refinement import (
     TooSmall,
     bent,
     boundary_curve,
@@ -16,9 +16,9 @@ from contactopt.bodies.local_refinement import (
     simplices,
     split,
 )
-from contactopt.bodies.refinement import part_curves, split_scene
-from contactopt.scenes.mesh_repair import volumes
-from contactopt.scenes.polar import ring
+from contactopt.meshes.mesh_repair import volumes
+from contactopt.meshes.polar import ring
+from contactopt.scenes.refined_scenes import part_curves, split_scene
 
 ANGLES = np.linspace(0, np.pi / 2, 9)  # eight elements a quarter
 

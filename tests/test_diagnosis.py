@@ -5,12 +5,12 @@ import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
-from contactopt.analysis.diagnosis import diagnose
-from contactopt.analysis.enumeration import all_solutions
+from contactopt.methods.alternating import Alternating
+from contactopt.methods.diagnosis import diagnose
+from contactopt.methods.enumeration import all_solutions
+from contactopt.methods.tresca_iteration import Tresca
 from contactopt.problem import Solution, Status
 from contactopt.problem.laws.bilateral import Bilateral
-from contactopt.solving.methods.alternating import Alternating
-from contactopt.solving.methods.tresca import Tresca
 
 BOTH = (("alternating", Alternating()), ("tresca", Tresca()))
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from skfem import Basis, ElementHex1, MeshQuad
 
-from contactopt.scenes.discs import extrude, half_disc
+from contactopt.meshes.discs import extrude, half_disc
 
 
 @pytest.mark.parametrize("sectors,count", [(1, 3), (2, 8), (3, 12)])

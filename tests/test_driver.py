@@ -7,9 +7,9 @@ from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, Status, natural_map_residual, solve
 from contactopt.benchmark.problems import rigid_bodies
-from contactopt.problem.operators import InterfaceOperator
-from contactopt.solving.deadline import check_time
-from contactopt.solving.methods import METHODS
+from contactopt.linear.deadline import check_time
+from contactopt.linear.operators import InterfaceOperator
+from contactopt.methods import METHODS
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from contactopt import InterfaceProblem, Part, Rigid, Scene
-from contactopt.analysis.edges import contact_edge, stick_edge
 from contactopt.material import Material
 from contactopt.problem.chart import Chart
+from contactopt.readings.edges import contact_edge, stick_edge
 
 PART = Part("body", None, Material(1.0, 0.3))
 

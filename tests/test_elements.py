@@ -27,10 +27,10 @@ from contactopt import (
 )
 from contactopt.bodies.body import build_body
 from contactopt.bodies.elements import FACES, contact_trace, make_basis, weight_at
-from contactopt.interface.recovery import recover
+from contactopt.coupling.back_to_bodies import recover
 from contactopt.material import lame
+from contactopt.meshes.structured import rename, simplices, tensor_mesh
 from contactopt.scenes.common import with_elements
-from contactopt.scenes.meshes import rename, simplices, tensor_mesh
 from experiments.questions import elements as experiment
 
 KINDS = ["plane-strain", "axisymmetric", "solid"]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, InterfaceProblem, fclib, siconos_residual, solve
+from contactopt.linear.operators import dense
 from contactopt.problem.laws.bilateral import Bilateral
-from contactopt.problem.operators import dense
 
 h5py = pytest.importorskip("h5py")
 FOLDER = Path(__file__).parents[2] / "shared" / "fclib"

@@ -6,10 +6,10 @@ import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, fclib, reduce, scenes, solve
+from contactopt.methods.admm import ADMM, Balanced
+from contactopt.methods.apg import APG, disc_qp
+from contactopt.methods.kernels.mprgp import box_qp, largest_eigenvalue, mprgp, projected_gradient, smalbe
 from contactopt.problem.cones import disc
-from contactopt.solving.kernels.mprgp import box_qp, largest_eigenvalue, mprgp, projected_gradient, smalbe
-from contactopt.solving.methods.admm import ADMM, Balanced
-from contactopt.solving.methods.apg import APG, disc_qp
 
 LIBRARY = Path(__file__).parents[2] / "shared" / "fclib"
 METHODS = {"apg": APG(), "admm": ADMM()}

@@ -23,11 +23,11 @@ from contactopt import (
     scenes,
     solve,
 )
-from contactopt.analysis.quantities import elastic_energy
-from contactopt.analysis.resultants import pair_resultants
 from contactopt.bodies import assemble
 from contactopt.bodies import elastic as elastic_bodies
-from contactopt.problem.balance import escape
+from contactopt.problem.unbalanced_loads import escape
+from contactopt.readings.quantities import elastic_energy
+from contactopt.readings.resultants import pair_resultants
 
 SOFT = Material(1000.0, 0.3)
 FLOOR = Rigid("floor", normal=(0, 1))

@@ -7,12 +7,12 @@ import pytest
 
 import contactopt
 from contactopt import InputError, follow, scenes
-from contactopt.analysis.solve_scene import Solved
+from contactopt.coupling.reduction import reduce_bodies
 from contactopt.derivatives.outputs import Functional, seeds_of
 from contactopt.derivatives.parameters import parameter, parameters
 from contactopt.derivatives.states import chain_of
-from contactopt.interface.reduction import reduce_bodies
-from contactopt.solving.driver import solve
+from contactopt.methods.driver import solve
+from contactopt.solving.solve_scene import Solved
 
 CASES = {
     "plane strain": (

@@ -8,19 +8,19 @@ from scipy.integrate import dblquad, quad
 
 import contactopt
 from contactopt import HalfSpace, InputError, Material, Part, Rigid, Scene, Support, natural_map_residual, scenes
-from contactopt.analysis.half_spaces import (
+from contactopt.bodies.influence import half_plane_influence, half_space_influence
+from contactopt.bodies.subsurface import boussinesq_cerruti, flamant
+from contactopt.coupling.reduction import reduce_bodies
+from contactopt.linear.convolution import Convolution
+from contactopt.methods.nested import Nested
+from contactopt.readings.half_space_readings import (
     contact_stiffness,
     pressure_distribution,
     subsurface_stress,
     surface_contact,
     surface_maps,
 )
-from contactopt.bodies.influence import half_plane_influence, half_space_influence
-from contactopt.bodies.subsurface import boussinesq_cerruti, flamant
-from contactopt.interface.reduction import reduce_bodies
-from contactopt.problem.convolution import Convolution
-from contactopt.scenes.surfaces import read_surface, rms_slope, self_affine
-from contactopt.solving.methods.nested import Nested
+from contactopt.scenes.rough_surfaces import read_surface, rms_slope, self_affine
 
 STEEL, SOFT = Material(5.0, 0.3), Material(2.0, 0.45)
 E_STAR = STEEL.E / (1 - STEEL.nu**2)
@@ -384,7 +384,7 @@ def test_prescribed_approach_is_the_total_force_turned_round():
 
 def test_half_space_meets_finite_elements():
     """A block of finite elements, thick and wide beside its contact, is nearly the half-space of the same points."""
-    from contactopt.scenes.meshes import graded, rename, tensor_mesh
+    from contactopt.meshes.structured import graded, rename, tensor_mesh
 
     x = np.linspace(-1.0, 1.0, 33)
     outer = graded(40.0, x[1] - x[0], 1.4)[1:]

@@ -7,9 +7,9 @@ import pytest
 
 from contactopt import HalfSpace, InterfaceProblem, Material, Rigid, Scene, Status, reduce_bodies, solve
 from contactopt.derivatives.interface import sensitivity
+from contactopt.methods import Repeated
+from contactopt.methods.kernels.balance import project_balanced
 from contactopt.problem.cones import disc_derivative
-from contactopt.solving.kernels.balance import project_balanced
-from contactopt.solving.methods import Repeated
 
 
 def held(dim, mu, seed=0, turn=0.0, unit=1.0, slope=0.0):

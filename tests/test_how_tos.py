@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from contactopt.benchmark.experiment import Experiment
-from contactopt.benchmark.figures import FIGURES
 from contactopt.benchmark.keys import EXPERIMENT, FIGURE, KINDS, help_text
+from contactopt.benchmark.report_figures import FIGURES
 from contactopt.benchmark.tables import TABLES
 from contactopt.cli import main
 

@@ -6,25 +6,18 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, reduce_bodies, run, scenes, solve
-from contactopt.analysis.solve_scene import Options
-from contactopt.analysis.zone import solve_zone
 from contactopt.bodies.solvers.superlu import SuperLUSolver
-from contactopt.interface.costs import form_of
+from contactopt.coupling.costs import form_of
+from contactopt.linear.operators import InterfaceOperator, block, estimate_diagonal, loosened, shifted
+from contactopt.methods.kernels.alart_curnier import coulomb_equations
+from contactopt.methods.kernels.krylov import krylov_step, model_of
+from contactopt.methods.kernels.subproblems import KrylovSubproblem
+from contactopt.methods.newton import Newton
 from contactopt.problem import dimensionless
-from contactopt.problem.chart import Chart
-from contactopt.problem.operators import (
-    InterfaceOperator,
-    block,
-    estimate_diagonal,
-    loosened,
-    nodal_weights,
-    shifted,
-)
+from contactopt.problem.chart import Chart, nodal_weights
 from contactopt.scenes import make_scene
-from contactopt.solving.kernels.alart_curnier import coulomb_equations
-from contactopt.solving.kernels.krylov import krylov_step, model_of
-from contactopt.solving.kernels.subproblems import KrylovSubproblem
-from contactopt.solving.methods.newton import Newton
+from contactopt.solving.solve_scene import Options
+from contactopt.solving.zone import solve_zone
 
 SMALL = {"punch-2d": 16, "sphere": 12, "punch-3d": 4}
 

@@ -18,17 +18,19 @@ from contactopt import (
     scenes,
     solve,
 )
+from contactopt.methods import METHODS, find_method, solvers_of
+from contactopt.methods.method import solves
 from contactopt.problem import dimensionless
 from contactopt.problem.cones import cylinder_derivative
-from contactopt.problem.laws import LAWS, Law, find_law, make_law
+from contactopt.problem.laws import LAWS, find_law, make_law
 from contactopt.problem.laws.associated import Associated
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.laws.frictionless import Frictionless
+from contactopt.problem.laws.law import Law
 from contactopt.problem.laws.mixed import Mixed, join
 from contactopt.problem.laws.tied import Tied
 from contactopt.problem.laws.tresca import Tresca
-from contactopt.solving.methods import METHODS, find_method, solvers_of, solves
 
 ALL = {
     "coulomb": Coulomb(0.4),

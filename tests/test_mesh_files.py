@@ -10,8 +10,8 @@ import skfem
 import skfem.io.meshio
 
 from contactopt import InputError, load_mesh
-from contactopt.scenes import mesh_formats
-from contactopt.scenes.mesh_files import name_boundaries
+from contactopt.meshes import mesh_formats
+from contactopt.meshes.mesh_files import name_boundaries
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0.0]])
 TWO = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])

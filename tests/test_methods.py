@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, InterfaceProblem, Status, natural_map_residual, reduce, scenes, solve
-from contactopt.solving.methods import METHODS, find_method
+from contactopt.methods import METHODS, find_method
 
 ALL = sorted(METHODS)
 OTHER_LAW = {"relaxation"}  # solves associated friction: agrees only where nothing slips

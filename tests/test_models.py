@@ -5,10 +5,10 @@ import qpsolvers
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, models
+from contactopt.methods.backends import CONIC, QP
+from contactopt.methods.backends.conic import Conic
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
-from contactopt.solving.backends import CONIC, QP
-from contactopt.solving.backends.conic import Conic
 
 PROGRAMS = ("normal", "displacements", "penalised", "bilateral", "tangential", "tresca", "associated", "acary_cadoux")
 

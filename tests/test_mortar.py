@@ -11,15 +11,15 @@ from mortar_scenes import couple, press_fit, resultants, ring, slab
 from skfem.quadrature import get_quadrature
 
 from contactopt import Contact, InputError, Material, Plate, Support, reduce, reduce_bodies, scenes, solve
-from contactopt.analysis.resolution import remarks
 from contactopt.bodies.elements import FACES, weight_at
-from contactopt.interface import segments
-from contactopt.interface.faces import Faces, cross, evaluate
-from contactopt.interface.mortar import mortar
-from contactopt.interface.search import Facets, facing_pairs
+from contactopt.coupling import segments
+from contactopt.coupling.faces import Faces, cross, evaluate
+from contactopt.coupling.facing import Facets, facing_pairs
+from contactopt.coupling.mortar import mortar
+from contactopt.meshes.structured import rename, tensor_mesh
+from contactopt.readings.resolution import remarks
 from contactopt.scenes import round as round_bodies
 from contactopt.scenes.common import with_elements
-from contactopt.scenes.meshes import rename, tensor_mesh
 from contactopt.scenes.scene import Part, Scene
 from experiments.questions.facing_surfaces import mesh, pair
 
@@ -628,7 +628,7 @@ def test_normals_at_the_ends_of_curved_elements_are_of_second_order():
 def test_mortar_is_chosen_where_nodes_do_not_match(caplog):
     scene = two_blocks("plane-strain", force=3.0)
     finer = replace(scene, lower=replace(scene.lower, mesh=slab("plane-strain", -2, 0, 7)))
-    with caplog.at_level(logging.INFO, logger="contactopt.interface"):
+    with caplog.at_level(logging.INFO, logger="contactopt.coupling"):
         same, other = reduce_bodies(scene), reduce_bodies(finer)
     assert (same.coupling.kind, other.coupling.kind, other.coupling.carrier) == ("matching", "mortar", "lower")
     assert "is coupled by mortar" in caplog.text

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve, transfer
 from contactopt.benchmark.problems import rigid_bodies as random_rigid_bodies
 from contactopt.benchmark.problems import tangential
+from contactopt.methods.auto import Auto
+from contactopt.methods.kernels.alart_curnier import coulomb_equations
+from contactopt.methods.kernels.bonded import Bonded
+from contactopt.methods.kernels.semismooth import Equations
 from contactopt.problem import dimensionless
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.scenes import make_scene
-from contactopt.solving.kernels.alart_curnier import coulomb_equations
-from contactopt.solving.kernels.bonded import Bonded
-from contactopt.solving.kernels.semismooth import Equations
-from contactopt.solving.methods.auto import Auto
 from experiments.questions.robustness import rigid_bodies
 
 SMALL = {"punch-2d": 16, "punch-3d": 5, "sphere": 12}
@@ -230,7 +230,7 @@ def test_auto_leaves_newton_when_it_cycles(monkeypatch):
     problem, _ = dimensionless(rigid_bodies(1, 6, 14, 0.7))
     wrong = np.ones(problem.q.shape)
     monkeypatch.setattr(
-        "contactopt.solving.methods.newton.Newton.steps",
+        "contactopt.methods.newton.Newton.steps",
         lambda self, p, s=None: iter([((wrong, np.zeros(0)), 1.0)] * 50),
     )
     points = []

@@ -6,8 +6,8 @@ import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, fclib, reduce, scenes, solve
+from contactopt.methods.nsgs import NSGS, Local
 from contactopt.problem import natural_map_residual
-from contactopt.solving.methods.nsgs import NSGS, Local
 
 LIBRARY = Path(__file__).parents[2] / "shared" / "fclib"
 

@@ -12,8 +12,8 @@ import pytest
 from browser import CHROMIUM, Browser
 
 from contactopt import InputError, cli, run, scenes
-from contactopt.figures.page import certificate_words, write_page
-from contactopt.interface.recovery import recover
+from contactopt.coupling.back_to_bodies import recover
+from contactopt.figures.view_page import certificate_words, write_page
 
 
 def decoded(packed):
@@ -58,7 +58,7 @@ def test_the_bodies_on_the_page_are_those_of_the_result(degree, tmp_path):
 
 
 def test_the_inside_of_large_bodies_is_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr("contactopt.figures.page.MOST_INSIDE", 10)
+    monkeypatch.setattr("contactopt.figures.view_page.MOST_INSIDE", 10)
     result = run(scenes.flat_punch(3, elements=2), tmp_path, figures=(), html=True)
     for body in data_of(tmp_path / "view.html")["bodies"]:
         (fields,) = (fields for fields in result.fields if fields.name == body["name"])
@@ -167,7 +167,7 @@ def damaged(data: bytes, way: str, rng: np.random.Generator) -> bytes:
 @pytest.mark.filterwarnings("error")
 def test_damaged_results_become_a_page_or_one_sentence(folder, tmp_path, monkeypatch, capfd):
     """Files cut, flipped, swapped, missing, and values of other types, in all three runs."""
-    monkeypatch.setattr("contactopt.figures.page.write_html", lambda *given: None)
+    monkeypatch.setattr("contactopt.figures.view_page.write_html", lambda *given: None)
     rng, refused, ways = np.random.default_rng(2), 0, ("cut", "flipped", "empty", "swapped", "missing", "type")
     for number in range(90):
         run_folder = folder / ("flat", "solid", "path")[number % 3]

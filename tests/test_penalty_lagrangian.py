@@ -3,12 +3,12 @@ import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, reduce, scenes, solve
+from contactopt.methods.augmented_lagrangian import AugmentedLagrangian
+from contactopt.methods.kernels.balance import project_balanced
+from contactopt.methods.lagrangian import Lagrangian
+from contactopt.methods.penalty import Penalty
 from contactopt.problem import dimensionless, natural_map_residual
 from contactopt.problem.cones import coulomb_cone_derivative, cylinder_derivative, disc_derivative
-from contactopt.solving.kernels.balance import project_balanced
-from contactopt.solving.methods.augmented_lagrangian import AugmentedLagrangian
-from contactopt.solving.methods.lagrangian import Lagrangian
-from contactopt.solving.methods.penalty import Penalty
 
 EXACT = {"lagrangian": Lagrangian(), "augmented": AugmentedLagrangian(), "uzawa": AugmentedLagrangian(explicit=True)}
 

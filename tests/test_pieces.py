@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import skfem
 
-from contactopt.bodies.elements import elements_of
 from contactopt.figures.pieces import mesh_lines, outline, pieces, segments, sharp_edges, solids, surface
+from contactopt.meshes.cells import elements_of
 
 TICKS = np.linspace(0, 1, 4)
 FLAT = (skfem.MeshTri, skfem.MeshTri2), (skfem.MeshQuad, skfem.MeshQuad2)

@@ -6,9 +6,8 @@ import scipy.linalg as la
 from scipy.sparse.linalg import cg
 
 from contactopt import InputError, InterfaceProblem, reduce, scenes
-from contactopt.problem.chart import Chart
-from contactopt.solving.kernels.krylov import model_of
-from contactopt.solving.preconditioners import (
+from contactopt.methods.kernels.krylov import model_of
+from contactopt.methods.preconditioners import (
     PRECONDITIONERS,
     deflated,
     preconditioner,
@@ -16,8 +15,9 @@ from contactopt.solving.preconditioners import (
     selection,
     smooth_motions,
 )
-from contactopt.solving.preconditioners.circulant import extended, inverse_of_extended, norm, seminorm
-from contactopt.solving.preconditioners.grid import Grid
+from contactopt.methods.preconditioners.circulant import extended, inverse_of_extended, norm, seminorm
+from contactopt.methods.preconditioners.grid import Grid
+from contactopt.problem.chart import Chart
 from experiments.questions.preconditioners import blocks, condition, solids
 
 SIZES = (17, 33, 65)  # contacts

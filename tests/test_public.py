@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 import contactopt
-from contactopt.interface.coupling import COUPLINGS
-from contactopt.solving.methods import METHODS
-from contactopt.solving.preconditioners import PRECONDITIONERS
+from contactopt.coupling.coupling import COUPLINGS
+from contactopt.methods import METHODS
+from contactopt.methods.preconditioners import PRECONDITIONERS
 
 # homes of what `contactopt` exports, the modules it exports, and those that its documentation sends readers to
 EXPORTED = [getattr(contactopt, name) for name in contactopt.__all__]
@@ -21,8 +21,8 @@ MODULES = sorted(
     | {
         "contactopt.problem",
         "contactopt.problem.cones",
-        "contactopt.scenes.meshes",
-        "contactopt.solving.preconditioners",
+        "contactopt.meshes.structured",
+        "contactopt.methods.preconditioners",
     }
 )
 

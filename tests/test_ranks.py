@@ -19,8 +19,8 @@ from contactopt.bodies.launch import OUTCOME, launch, mpiexec
 from contactopt.bodies.protocol import Body
 from contactopt.bodies.remote import RemoteBody
 from contactopt.cli import main
+from contactopt.methods.preconditioners import degrees
 from contactopt.scenes.slices import sliced
-from contactopt.solving.preconditioners import degrees
 
 ROOT = Path(__file__).parents[1]
 PATIENCE = 300  # seconds; a test that needs them hangs

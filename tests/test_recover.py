@@ -6,10 +6,10 @@ import pytest
 from conftest import two_blocks
 
 from contactopt import reduce_bodies, run, scenes, solve
-from contactopt.bodies.elements import elements_of
-from contactopt.bodies.local_refinement import simplices
+from contactopt.coupling.back_to_bodies import recover
 from contactopt.figures.pieces import outline
-from contactopt.interface.recovery import recover
+from contactopt.meshes.cells import elements_of
+from contactopt.meshes.local_refinement import simplices
 
 
 def solved(scene, **kw):

@@ -7,13 +7,13 @@ from conftest import MATERIAL
 
 import contactopt
 from contactopt import InputError, Part, Rigid, Scene, Support, scenes
-from contactopt.analysis.places import place_of, read_place, read_stress
-from contactopt.analysis.solve_scene import solve_scene
 from contactopt.bodies.fields import STRESSES, fields_of, nodal_stress
 from contactopt.bodies.protocol import Region
-from contactopt.bodies.recovery import stress_map, von_mises, von_mises_slopes
-from contactopt.interface.reduction import reduce_bodies
+from contactopt.bodies.stress_recovery import stress_map, von_mises, von_mises_slopes
+from contactopt.coupling.reduction import reduce_bodies
+from contactopt.readings.places import place_of, read_place, read_stress
 from contactopt.scenes import make_scene
+from contactopt.solving.solve_scene import solve_scene
 
 TICKS = np.linspace(0, 1, 5) ** 1.3
 MESHES = {

@@ -19,7 +19,7 @@ from contactopt import (
     solve,
 )
 from contactopt.bodies.solvers.ordering import nested_dissection
-from contactopt.interface.recovery import recover
+from contactopt.coupling.back_to_bodies import recover
 
 KINDS = ["plane-strain", "axisymmetric", "solid"]
 AREA = {"plane-strain": 1.0, "axisymmetric": np.pi, "solid": 1.0}

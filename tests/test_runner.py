@@ -8,7 +8,7 @@ from skfem import MeshTri
 
 import contactopt
 from contactopt import InputError, Material, Part, Plate, Rigid, Scene, cli, run
-from contactopt.analysis.quantities import value_of
+from contactopt.readings.quantities import value_of
 
 KEYS = [
     "scene",

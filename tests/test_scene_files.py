@@ -13,10 +13,10 @@ from conftest import MATERIAL
 import contactopt
 from contactopt import Contact, InputError, Part, Plate, Rigid, Scene, Support, Traction
 from contactopt.cli import main
+from contactopt.files.toml_table import lines_of
 from contactopt.scenes.example import EXAMPLE
 from contactopt.scenes.expressions import Expression
 from contactopt.scenes.scene_files import read_scene_file
-from contactopt.scenes.toml_table import lines_of
 
 SMALL = """\
 kind = "plane-strain"

@@ -3,7 +3,7 @@ import pytest
 from conftest import MATERIAL, block
 
 from contactopt import InputError, Material, Part, Plate, Scene, Support, Traction, reduce, scenes, solve
-from contactopt.analysis.edges import contact_edge, stick_edge
+from contactopt.readings.edges import contact_edge, stick_edge
 from contactopt.scenes import PATHS, SCENES, make_path, make_scene
 
 

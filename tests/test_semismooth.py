@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from contactopt.methods.kernels.semismooth import Equations, crossover
 from contactopt.problem.cones import disc_derivative, half_line_derivative
-from contactopt.solving.kernels.semismooth import Equations, crossover
 
 
 def spd(n, seed=0):

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 import contactopt
 from contactopt import InputError, InterfaceProblem, Solution, Status, natural_map_residual, scenes, solve
-from contactopt.interface.reduction import reduce_bodies
+from contactopt.coupling.reduction import reduce_bodies
 from contactopt.problem.laws.associated import Associated
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb

@@ -10,12 +10,12 @@ from turned import moved, turn
 
 import contactopt
 from contactopt import InputError, Material, Part, Plate, Rigid, Scene, Support, Traction, cli, scenes, simplify
-from contactopt.analysis.quantities import approach, elastic_energy
-from contactopt.analysis.solve_scene import Options, Solved, solve_scene
 from contactopt.bodies.protocol import Region
-from contactopt.scenes.meshes import rename, simplices, tensor_mesh
-from contactopt.scenes.polar import ring
+from contactopt.meshes.polar import ring
+from contactopt.meshes.structured import rename, simplices, tensor_mesh
+from contactopt.readings.quantities import approach, elastic_energy
 from contactopt.simplification import images
+from contactopt.solving.solve_scene import Options, Solved, solve_scene
 
 SOFT, STIFF = Material(5.0, 0.3), Material(20.0, 0.2)
 TIGHT = Options(tol=1e-12)

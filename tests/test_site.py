@@ -12,7 +12,7 @@ import pytest
 from test_how_tos import PAGES
 
 import contactopt
-from contactopt.solving.methods import METHODS
+from contactopt.methods import METHODS
 
 ROOT = Path(__file__).parents[1]
 SITE = ROOT / "experiments" / "site"
@@ -131,14 +131,14 @@ def test_every_room_has_a_page_that_names_its_modules(reference):
 
 def test_every_entry_of_every_table_is_on_its_page(reference):
     from contactopt.bodies.solvers import SOLVERS
+    from contactopt.methods.backends import CONIC, QP
+    from contactopt.methods.preconditioners import PRECONDITIONERS
     from contactopt.scenes import SCENES
-    from contactopt.solving.backends import CONIC, QP
-    from contactopt.solving.preconditioners import PRECONDITIONERS
 
     pages = {str(path): page for path, page in reference.plug_in_pages(SITE)}
     tables = {"scenes": SCENES, "preconditioners": PRECONDITIONERS, "body_solvers": SOLVERS, "backends": QP | CONIC}
     laws = reference.optional("contactopt.problem.laws", "LAWS")
-    couplings = reference.optional("contactopt.interface.coupling", "COUPLINGS")
+    couplings = reference.optional("contactopt.coupling.coupling", "COUPLINGS")
     for name, table in (tables | {"laws": laws, "couplings": couplings}).items():
         assert (f"{name}.md" in pages) == bool(table)
         listed = re.findall(r"^\| `([\w-]+)` \|", pages.get(f"{name}.md", ""), re.M)

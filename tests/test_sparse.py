@@ -5,11 +5,11 @@ import pytest
 import scipy.sparse as sp
 
 from contactopt import InputError, InterfaceProblem, fclib, natural_map_residual, solve
+from contactopt.linear.operators import asymmetry, block, dense, diagonal, held, shifted
+from contactopt.methods.kernels.homotopy import Homotopy, homotopy_iterates
+from contactopt.methods.kernels.interior import Path, interior_iterates
+from contactopt.methods.kernels.sparse_blocks import DenseBlocks, SparseBlocks
 from contactopt.problem import dimensionless
-from contactopt.problem.operators import asymmetry, block, dense, diagonal, held, shifted
-from contactopt.solving.kernels.homotopy import Homotopy, homotopy_iterates
-from contactopt.solving.kernels.interior import Path, interior_iterates
-from contactopt.solving.kernels.sparse_blocks import DenseBlocks, SparseBlocks
 from experiments.questions.coulomb_check import violations
 from experiments.questions.granular import packing
 

@@ -9,10 +9,10 @@ from scipy.sparse.linalg import cg
 from skfem import MeshQuad, MeshTri
 
 from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Support, reduce
+from contactopt.meshes.structured import graded
+from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
+from contactopt.methods.preconditioners.surface import divergences, inverse_root, laplacian, surface_matrices
 from contactopt.problem.chart import Chart
-from contactopt.scenes.meshes import graded
-from contactopt.solving.preconditioners import deflated, preconditioner, smooth_motions
-from contactopt.solving.preconditioners.surface import divergences, inverse_root, laplacian, surface_matrices
 
 POISSON = 0.3
 
@@ -251,6 +251,6 @@ def test_eigenvectors_and_poles_are_the_same_root(monkeypatch):
     held = np.zeros((k, 3), dtype=bool)
     X = np.random.default_rng(0).normal(size=(k, 3))
     dense = [act(X) for act in laplacian(problem, held)]
-    monkeypatch.setattr("contactopt.solving.preconditioners.surface.EIGENVECTORS", 0)
+    monkeypatch.setattr("contactopt.methods.preconditioners.surface.EIGENVECTORS", 0)
     for act, product in zip(laplacian(problem, held), dense):
         assert np.abs(act(X) - product).max() <= 1e-3 * np.abs(product).max()

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.spatial import KDTree
 
 from contactopt import InterfaceProblem, diagnose, natural_map_residual, reduce_bodies, siconos_residual, solve
-from contactopt.analysis.status import contact_status
+from contactopt.methods import METHODS
+from contactopt.problem.contact_status import contact_status
 from contactopt.problem.laws.bilateral import Bilateral
-from contactopt.solving.methods import METHODS
 
 CONTACTS = 6
 DIMENSION = st.sampled_from([2, 3])

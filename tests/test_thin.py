@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from contactopt import Contact, Material, Part, Rigid, Scene, Support, Traction, run
-from contactopt.interface.reduction import reduce_bodies
-from contactopt.scenes.meshes import rename, tensor_mesh
+from contactopt.coupling.reduction import reduce_bodies
+from contactopt.meshes.structured import rename, tensor_mesh
 
 E, NU = 1000.0, 0.3
 SOFT = Material(E, NU)

@@ -10,10 +10,10 @@ import pytest
 
 from contactopt import InputError, InterfaceProblem, solve
 from contactopt.errors import BackendError
-from contactopt.solving.backends import CONIC, QP, child
-from contactopt.solving.backends.qp import BoxQP
-from contactopt.solving.deadline import TimeUp, until
-from contactopt.solving.methods import METHODS
+from contactopt.linear.deadline import TimeUp, until
+from contactopt.methods import METHODS
+from contactopt.methods.backends import CONIC, QP, child
+from contactopt.methods.backends.qp import BoxQP
 from experiments.questions.granular import packing
 
 LIMIT, SLACK = 0.5, 1.0

@@ -6,11 +6,11 @@ import pytest
 from conftest import one_contact
 
 from contactopt import InputError, InterfaceProblem, Material, Part, Rigid, Scene, Support, fclib, reduce, scenes, solve
+from contactopt.meshes.structured import rename, tensor_mesh
+from contactopt.methods.tresca_iteration import Tresca, TrescaProblem
 from contactopt.problem import dimensionless
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
-from contactopt.scenes.meshes import rename, tensor_mesh
-from contactopt.solving.methods.tresca import Tresca, TrescaProblem
 
 CYCLING = (-10.0, 1.0)
 FCLIB = Path(__file__).parents[2] / "shared" / "fclib"

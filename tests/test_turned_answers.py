@@ -6,11 +6,11 @@ import turned
 from scipy.spatial import KDTree
 
 from contactopt import solve
-from contactopt.analysis.edges import contact_edge, stick_edge
-from contactopt.analysis.quantities import value_of
-from contactopt.analysis.solve_scene import Options, solve_scene
-from contactopt.analysis.status import contact_status
-from contactopt.solving.preconditioners import preconditioner
+from contactopt.methods.preconditioners import preconditioner
+from contactopt.problem.contact_status import contact_status
+from contactopt.readings.edges import contact_edge, stick_edge
+from contactopt.readings.quantities import value_of
+from contactopt.solving.solve_scene import Options, solve_scene
 
 SCENES = {
     "punch": lambda: turned.punch(elements=16, mu=0.1),

@@ -5,7 +5,7 @@ import pytest
 import skfem
 
 from contactopt import InputError, Material, Part, Plate, Rigid, Scene, Support, run
-from contactopt.figures.page import _body, page_data
+from contactopt.figures.view_page import _body, page_data
 
 SOFT = Material(1000.0, 0.3)
 

@@ -9,9 +9,9 @@ import pytest
 from conftest import two_blocks
 
 from contactopt import InputError, Plate, Rigid, Scene, Support, diagnose, reduce, reduce_bodies, run, scenes
-from contactopt.analysis.paths import follow
 from contactopt.cards import card
 from contactopt.problem import InterfaceProblem
+from contactopt.solving.paths import follow
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import pytest
 
 from contactopt import InputError, InterfaceProblem, fclib, follow, reduce, run, solve
 from contactopt.cli import main
+from contactopt.meshes.structured import rename, tensor_mesh
 from contactopt.scenes import flat_punch
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.meshes import rename, tensor_mesh
 from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
 
 PROBLEM = InterfaceProblem(np.eye(2), [[-1.0, 0.2]], 0.3)
@@ -176,8 +176,8 @@ def test_too_little_memory_is_one_sentence(monkeypatch, tmp_path, capsys):
     def full(*arguments, **settings):
         raise MemoryError
 
-    monkeypatch.setattr("contactopt.analysis.zone.solve_scene", full)
-    monkeypatch.setattr("contactopt.analysis.solve_scene.reduce_bodies", full)
+    monkeypatch.setattr("contactopt.solving.zone.solve_scene", full)
+    monkeypatch.setattr("contactopt.solving.solve_scene.reduce_bodies", full)
     assert main(["run", "punch-2d", "--elements", "4", "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
     assert said.strip().splitlines()[-1].startswith("contactopt: this needs more memory") and "Traceback" not in said

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from contactopt import InterfaceProblem, reduce, scenes, solve
-from contactopt.analysis.edges import contact_edge, stick_edge
-from contactopt.analysis.solve_scene import Options
-from contactopt.analysis.status import contact_status
-from contactopt.analysis.zone import solve_zone
+from contactopt.problem.contact_status import contact_status
 from contactopt.problem.laws.bilateral import Bilateral
+from contactopt.readings.edges import contact_edge, stick_edge
+from contactopt.solving.solve_scene import Options
+from contactopt.solving.zone import solve_zone
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ def test_a_scene_without_a_zone_is_solved_once():
 
 @pytest.mark.parametrize("solver", ["superlu", "pardiso"])
 def test_the_coarse_start_keeps_the_form_of_q_and_the_solver(solver, monkeypatch):
-    from contactopt.analysis import solve_scene as module
+    from contactopt.solving import solve_scene as module
 
     if solver == "pardiso":
         pytest.importorskip("pypardiso")

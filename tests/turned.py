@@ -7,7 +7,7 @@ import numpy as np
 import skfem
 
 from contactopt import Material, Part, Plate, Rigid, Scene, Support, Traction, scenes
-from contactopt.scenes.meshes import graded, patch, rename, tensor_mesh
+from contactopt.meshes.structured import graded, patch, rename, tensor_mesh
 
 SOFT, STIFF = Material(5.0, 0.3), Material(20.0, 0.2)
 

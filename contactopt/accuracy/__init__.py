@@ -5,7 +5,7 @@
 Every mesh is a Level, the end is an Estimate. The estimated error of the value is the largest of
 
     what the search says of it: differences of nested solutions, or a sum over the elements (below);
-    how uncertain its reading is (contactopt.analysis.quantities, contactopt.analysis.places);
+    how uncertain its reading is (contactopt.readings.quantities, contactopt.readings.places);
     by how much another local maximum may exceed it, whose elements are refined, too.
 
 The error of a geometry that the file gives by straight edges alone is added at the end (contactopt.accuracy.polygon). A target
@@ -25,7 +25,7 @@ The force at a contact is a mean of the pressure nearby. For a J that reads pres
 half of p_i less the mean of the piecewise linear p around i (indicators.pressure_errors), times dJ/dp_i. Without it a contact that
 is smaller than an element would seem exact, since then equilibrium alone says what the one closed contact carries.
 
-A stress at a place is recovered by a fit to the stresses of the elements near it (contactopt.bodies.recovery). For a stress
+A stress at a place is recovered by a fit to the stresses of the elements near it (contactopt.bodies.stress_recovery). For a stress
 s* = R D U the adjoint load is D' R' dJ/ds*. The stresses scatter about the fit, and the estimated error is at least two standard
 errors of the fit. For a largest stress this covers the places where it could be larger by as much; these are refined too.
 

@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from contactopt.accuracy.estimate import Level
-from contactopt.analysis.quantities import Peak, Reading, at_rim
-from contactopt.analysis.resultants import views
-from contactopt.analysis.solve_scene import Solved
-from contactopt.bodies.curves import CORNER
-from contactopt.bodies.elements import straight
-from contactopt.bodies.local_refinement import simplices
+from contactopt.meshes.cells import straight
+from contactopt.meshes.curves import CORNER
+from contactopt.meshes.local_refinement import simplices
+from contactopt.readings.quantities import Peak, Reading, at_rim
+from contactopt.readings.resultants import views
+from contactopt.solving.solve_scene import Solved
 
 HALVED = 1.8  # by how much smaller elements must be for a level to count as the next one
 TRIED = 3  # meshes before a largest stress at a corner is taken for infinite

@@ -25,13 +25,13 @@ import numpy as np
 
 from contactopt.accuracy.estimate import Judged, Level
 from contactopt.accuracy.indicators import EDGES
-from contactopt.analysis.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
-from contactopt.analysis.paths import solve_states
-from contactopt.analysis.quantities import Reading
-from contactopt.analysis.solve_scene import Options, Solved
-from contactopt.bodies.elements import is_curved
-from contactopt.bodies.refinement import split_scene
+from contactopt.meshes.cells import is_curved
+from contactopt.readings.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
+from contactopt.readings.quantities import Reading
+from contactopt.scenes.refined_scenes import split_scene
 from contactopt.scenes.scene import Part, Scene
+from contactopt.solving.paths import solve_states
+from contactopt.solving.solve_scene import Options, Solved
 
 
 def best_order(quantity: str, degree: int) -> int:

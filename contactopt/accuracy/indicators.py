@@ -8,11 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from contactopt.analysis.solve_scene import Solved
+from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.outputs import Quantity
 from contactopt.derivatives.states import Duals, Step
 from contactopt.errors import InputError
-from contactopt.interface.reduction import Reduction
+from contactopt.solving.solve_scene import Solved
 
 log = logging.getLogger(__name__)
 ENERGY = "energy"

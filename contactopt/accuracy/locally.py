@@ -21,11 +21,11 @@ from contactopt.accuracy.marking import (
     unknowns,
     with_bent_edges,
 )
-from contactopt.analysis.paths import solve_states
-from contactopt.analysis.quantities import Peak, Reading, nodal_pressure
-from contactopt.analysis.solve_scene import Options, Solved, solve_scene
 from contactopt.derivatives.outputs import Quantity
+from contactopt.readings.quantities import Peak, Reading, nodal_pressure
 from contactopt.scenes.scene import Scene
+from contactopt.solving.paths import solve_states
+from contactopt.solving.solve_scene import Options, Solved, solve_scene
 
 SHARE = 0.6  # of the estimated error that the marked elements make; Doerfler's marking allows anything between 0 and 1
 USUAL = 2_000_000  # unknowns of the largest mesh, unless another bound is given

@@ -14,15 +14,15 @@ from contactopt.accuracy.estimate import Estimate, Judged, Level
 from contactopt.accuracy.everywhere import Everywhere
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
-from contactopt.analysis.limits import Limits
-from contactopt.analysis.progress import resident_memory
-from contactopt.analysis.quantities import Peak, Reading
-from contactopt.analysis.resolution import coarse
-from contactopt.analysis.solve_scene import Options, Solved
 from contactopt.checks import check_number
 from contactopt.derivatives.outputs import Quantity, find_quantity
 from contactopt.errors import InputError
+from contactopt.readings.quantities import Peak, Reading
+from contactopt.readings.resolution import coarse
 from contactopt.scenes.scene import Scene
+from contactopt.solving.limits import Limits
+from contactopt.solving.progress import resident_memory
+from contactopt.solving.solve_scene import Options, Solved
 
 log = logging.getLogger(__name__)
 MOST_LEVELS = 60

@@ -11,12 +11,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from contactopt.accuracy.polygon import Chords, chords_of, flatter
-from contactopt.analysis.quantities import Peak
-from contactopt.bodies.elements import is_curved, straight
-from contactopt.bodies.local_refinement import Curve, bent, divide, facets_of, simplices, split
-from contactopt.bodies.refinement import part_curves
+from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
-from contactopt.interface.reduction import Reduction
+from contactopt.meshes.cells import is_curved, straight
+from contactopt.meshes.local_refinement import Curve, bent, divide, facets_of, simplices, split
+from contactopt.readings.quantities import Peak
+from contactopt.scenes.refined_scenes import part_curves
 from contactopt.scenes.scene import Part, Rigid, Scene
 
 FIRST = 4  # elements across the contact half-width of a first mesh that the scene itself makes
@@ -57,7 +57,7 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
     """Put a scene on meshes of straight elements, and find the curves of their boundaries.
 
     A boundary follows the `curve` of its part or the edges of second order of its file. Without them the curve is a
-    guess, the smooth outline through the nodes of the first mesh (contactopt.bodies.curves).
+    guess, the smooth outline through the nodes of the first mesh (contactopt.meshes.curves).
 
     Parameters
     ----------

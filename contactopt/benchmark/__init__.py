@@ -32,9 +32,9 @@ A method of your own is a function in `mine.py`; nothing in this package changes
         ...
         return r                                # or (r, multipliers), or a contactopt.Solution
 
-Instead of a function it may be a dataclass with `iterate`, as in contactopt.solving.methods: it then gets the driver's stopping
+Instead of a function it may be a dataclass with `iterate`, as in contactopt.methods: it then gets the driver's stopping
 rule and history. `@problem` registers a function that makes an InterfaceProblem in the same way, for `family = NAME`.
-An installed package offers methods as entry points of the group "contactopt.solving.methods". What a method claims is never
+An installed package offers methods as entry points of the group "contactopt.methods". What a method claims is never
 believed: each answer gets the certificate of contactopt.natural_map_residual, in the process of the campaign and from the
 problem that it holds. Plug-ins run in worker processes only, so that none can change how it is judged.
 """

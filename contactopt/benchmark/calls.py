@@ -17,9 +17,9 @@ from contactopt.benchmark.process import one_line
 from contactopt.benchmark.runs import PASSED
 from contactopt.benchmark.store import STATUSES
 from contactopt.errors import BackendError, InputError
+from contactopt.methods import METHODS, find_method
+from contactopt.methods.driver import solve
 from contactopt.problem import InterfaceProblem, Solution, Status
-from contactopt.solving.driver import solve
-from contactopt.solving.methods import METHODS, find_method
 
 POINTS = 100  # of a history
 MB = 1e6

@@ -9,16 +9,16 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
+from contactopt.benchmark.campaign_files import subfolder, told
 from contactopt.benchmark.experiment import Experiment, NothingToRun, read_experiment
-from contactopt.benchmark.files import subfolder, told
 from contactopt.benchmark.measure import Task
 from contactopt.benchmark.pool import run_locally, run_on_cluster
 from contactopt.benchmark.process import end_orphans
-from contactopt.benchmark.report import build, publish, read_layout
+from contactopt.benchmark.reports import build, publish, read_layout
 from contactopt.benchmark.store import Store, load, require, save
 from contactopt.checks import check_count
 from contactopt.errors import InputError
-from contactopt.files import remove_files, replace_file
+from contactopt.files.writing import remove_files, replace_file
 
 MOST_JOBS = 1000
 WRITTEN = ("rows.jsonl", "rows.parquet", "experiment.toml")  # by a campaign

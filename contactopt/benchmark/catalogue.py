@@ -10,7 +10,7 @@ from typing import Any
 from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.process import Ended, Process
 from contactopt.errors import InputError
-from contactopt.solving.methods import METHODS
+from contactopt.methods import METHODS
 
 LIMIT = 120.0  # s to load all plug-ins
 

@@ -19,7 +19,7 @@ from contactopt.benchmark.problems import FAMILIES, KINDS, ProblemSpec, named
 from contactopt.benchmark.runs import SETTINGS, STARTS, MethodSpec, Run
 from contactopt.checks import check_name, check_number, short
 from contactopt.errors import InputError
-from contactopt.scenes.toml_table import Table, read_table
+from contactopt.files.toml_table import Table, read_table
 
 MOST_RUNS = 200_000  # of one experiment
 BOUNDS = {"time_limit": (0.0, 1e6), "memory_limit": (0.2, 1e4)}  # s; GB: less than the least holds no NumPy and SciPy
@@ -46,7 +46,7 @@ class Experiment:
     seed          of NumPy's and Python's generators before each run
     diagnose      rank, condition and thresholds of friction with each problem (contactopt.diagnose)
     quick         keys that a quick version replaces
-    figures       of the report, see contactopt.benchmark.report; findings: file with a function findings(table)
+    figures       of the report, see contactopt.benchmark.reports; findings: file with a function findings(table)
     """
 
     name: str

@@ -17,15 +17,15 @@ from pathlib import Path
 from typing import Any
 
 from contactopt.errors import InputError
-from contactopt.solving.methods import METHODS
+from contactopt.methods import METHODS
 
-GROUP = "contactopt.solving.methods"  # of entry points
+GROUP = "contactopt.methods"  # of entry points
 LAWS = ("coulomb", "associated")
 
 
 @dataclass(frozen=True)
 class Plugin:
-    """make: a function problem -> answer, or a class whose objects have `iterate` (contactopt.solving.methods.Method)."""
+    """make: a function problem -> answer, or a class whose objects have `iterate` (contactopt.methods.method.Method)."""
 
     name: str
     make: Callable[..., Any]

@@ -139,7 +139,7 @@ def reduced(name: str, **parameters: Any) -> InterfaceProblem:
     InterfaceProblem
         The problem.
     """
-    from contactopt.interface.reduction import reduce
+    from contactopt.coupling.reduction import reduce
 
     return reduce(scene(name, **parameters), Q="explicit")
 
@@ -259,7 +259,7 @@ def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) 
     InputError
         If the normal problem is not solved.
     """
-    from contactopt.solving.driver import solve
+    from contactopt.methods.driver import solve
 
     coupled = reduced(of, mu=0.0, **parameters)
     k, dim = coupled.q.shape

@@ -12,8 +12,9 @@ from typing import Any
 from contactopt.benchmark.catalogue import Declared
 from contactopt.benchmark.problems import ProblemSpec, short_number
 from contactopt.errors import InputError
-from contactopt.solving.backends import CONIC, QP
-from contactopt.solving.methods import METHODS, NATIVE, find_method
+from contactopt.methods import METHODS, find_method
+from contactopt.methods.backends import CONIC, QP
+from contactopt.methods.method import NATIVE
 
 DEFAULT_TOL = 1e-8  # by which the setting "default" is judged: that of contactopt.solve
 SETTINGS = {"default": DEFAULT_TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.benchmark.files import told
+from contactopt.benchmark.campaign_files import told
 from contactopt.errors import InputError
-from contactopt.files import replace_file
+from contactopt.files.writing import replace_file
 from contactopt.problem import Status
 
 if TYPE_CHECKING:

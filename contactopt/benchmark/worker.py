@@ -24,10 +24,10 @@ from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
 from contactopt.errors import InputError
+from contactopt.linear.operators import InterfaceOperator
+from contactopt.methods.driver import solve
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.laws.coulomb import Coulomb
-from contactopt.problem.operators import InterfaceOperator
-from contactopt.solving.driver import solve
 
 NEIGHBOUR = 0.9  # load and friction of the problem whose solution is the warm start
 UNBUILT = (InputError, MemoryError, ArithmeticError, ValueError, np.linalg.LinAlgError)
@@ -151,7 +151,7 @@ def _only(own: int) -> None:
 
 
 def _diagnosis(problem: InterfaceProblem) -> dict[str, float]:
-    from contactopt.analysis.diagnosis import diagnose
+    from contactopt.methods.diagnosis import diagnose
 
     found = diagnose(problem)
     return {

@@ -16,13 +16,14 @@ import skfem
 from scipy.sparse.csgraph import connected_components
 from skfem.helpers import dot
 
-from contactopt.bodies.elements import SHAPES, Trace, contact_trace, make_basis, node_unknowns, straight, weight_at
+from contactopt.bodies.elements import Trace, contact_trace, make_basis, node_unknowns, weight_at
 from contactopt.bodies.mirror_planes import mirrored_nodes
 from contactopt.bodies.motions import Motions, check_free, free_motions
 from contactopt.bodies.protocol import Guides
 from contactopt.bodies.stiffness import isotropic_stiffness, stiffness
 from contactopt.errors import InputError
 from contactopt.material import Material, lame_by_poisson
+from contactopt.meshes.cells import SHAPES, straight
 from contactopt.scenes.scene import Part, Plate, Scene, Traction
 
 PLANE = 1e-9  # nodes lie in a plane within this fraction of the body's extent

@@ -29,13 +29,13 @@ from contactopt.bodies.body import Assembly, build_body, guides_of, reload_body
 from contactopt.bodies.elements import face_nodes
 from contactopt.bodies.fields import Fields, Limits, fields_of, limits_of, recovery_errors
 from contactopt.bodies.protocol import Equilibrium, Guides, Mesh, Region, Surface
-from contactopt.bodies.recovery import StressMap, stress_map
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
+from contactopt.bodies.stress_recovery import StressMap, stress_map
 from contactopt.bodies.thin import is_thin, on_ground
 from contactopt.errors import InputError
-from contactopt.problem.operators import Product
-from contactopt.scenes.curves import check_curve
+from contactopt.linear.operators import Product
+from contactopt.meshes.given_curves import check_curve
 from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)

@@ -11,8 +11,9 @@ import numpy as np
 import skfem
 
 from contactopt.bodies.body import Assembly
-from contactopt.bodies.elements import SHAPES, elements_of, second_order, straight, weight_at
+from contactopt.bodies.elements import weight_at
 from contactopt.material import lame
+from contactopt.meshes.cells import SHAPES, elements_of, second_order, straight
 
 STRESSES = {
     "plane-strain": ("xx", "yy", "zz", "xy"),

@@ -23,10 +23,10 @@ from contactopt.bodies.fields import Limits
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
 from contactopt.bodies.protocol import Guides, Surface
 from contactopt.errors import InputError
+from contactopt.linear.convolution import Convolution, Kernel, embedding
+from contactopt.linear.operators import Product
 from contactopt.material import Material, lame
 from contactopt.problem.chart import Chart
-from contactopt.problem.convolution import Convolution, Kernel, embedding
-from contactopt.problem.operators import Product
 from contactopt.scenes.contact import SIDES
 from contactopt.scenes.scene import HalfSpace, Scene
 

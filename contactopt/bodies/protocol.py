@@ -22,14 +22,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.problem.coupled import BodyTerm, LocalTerm
+from contactopt.linear.saddle_point import BodyTerm, LocalTerm
 
 if TYPE_CHECKING:
     from contactopt.bodies.fields import Fields, Limits
-    from contactopt.bodies.recovery import StressMap
+    from contactopt.bodies.stress_recovery import StressMap
+    from contactopt.linear.convolution import Kernel
+    from contactopt.linear.operators import Product
     from contactopt.problem.chart import Chart
-    from contactopt.problem.convolution import Kernel
-    from contactopt.problem.operators import Product
 
 
 @dataclass(frozen=True, eq=False)
@@ -534,7 +534,7 @@ class Body(Protocol):
         """
 
     def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap | None:
-        """Make the recovered stress in a region a linear map of the displacements (contactopt.bodies.recovery).
+        """Make the recovered stress in a region a linear map of the displacements (contactopt.bodies.stress_recovery).
 
         Parameters
         ----------

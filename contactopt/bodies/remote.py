@@ -22,11 +22,11 @@ from contactopt.bodies.elastic import AssembledElastic
 from contactopt.bodies.fields import Fields, Limits
 from contactopt.bodies.protocol import Guides, Region, Surface
 from contactopt.bodies.ranks import Kept, RemotePart, Team, shipped, values_of
-from contactopt.bodies.recovery import StressMap
+from contactopt.bodies.stress_recovery import StressMap
 from contactopt.errors import InputError
-from contactopt.problem.coupled import LocalTerm
-from contactopt.problem.operators import Product
-from contactopt.problem.stacked import dot
+from contactopt.linear.operators import Product
+from contactopt.linear.saddle_point import LocalTerm
+from contactopt.linear.stacked import dot
 from contactopt.scenes.scene import Part, Scene
 
 
@@ -112,7 +112,7 @@ class Field:
 
 @dataclass(frozen=True, eq=False)
 class RemoteTerm:
-    """The term of a body on another rank, as contactopt.problem.coupled.BodyTerm asks.
+    """The term of a body on another rank, as contactopt.linear.saddle_point.BodyTerm asks.
 
     rows  (m,) rows of u that the body moves, which alone travel;   length  number of all rows
     """
@@ -312,7 +312,7 @@ def _sendable(value: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class RemoteStressMap:
-    """A contactopt.bodies.recovery.StressMap on the rank of its body, with its places and sources here."""
+    """A contactopt.bodies.stress_recovery.StressMap on the rank of its body, with its places and sources here."""
 
     owner: RemoteBody
     kept: Kept

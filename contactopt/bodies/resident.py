@@ -14,9 +14,9 @@ import scipy.sparse as sp
 
 from contactopt.bodies.elastic import AssembledElastic, ElasticBody, assemble_elastic
 from contactopt.bodies.ranks import shipped
-from contactopt.bodies.recovery import StressMap
-from contactopt.problem.coupled import LocalTerm
-from contactopt.problem.operators import Product
+from contactopt.bodies.stress_recovery import StressMap
+from contactopt.linear.operators import Product
+from contactopt.linear.saddle_point import LocalTerm
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from contactopt.bodies.fields import Limits
 from contactopt.bodies.protocol import Guides, Surface
 from contactopt.checks import real_array
 from contactopt.errors import InputError
-from contactopt.problem.operators import Product
+from contactopt.linear.operators import Product
 from contactopt.scenes.scene import Rigid, Scene
 
 log = logging.getLogger(__name__)

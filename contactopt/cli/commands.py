@@ -10,10 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from contactopt.analysis.resultants import resultant_words
 from contactopt.cards import count
 from contactopt.errors import InputError
-from contactopt.solving.methods import NATIVE
+from contactopt.methods.method import NATIVE
+from contactopt.readings.resultants import resultant_words
 
 FORCES = {("mm", "MPa"): "N", ("m", "Pa"): "N", ("m", "kPa"): "kN", ("m", "MPa"): "MN", ("in", "psi"): "lbf"}
 Command = Callable[[argparse.Namespace], int]
@@ -164,7 +164,7 @@ def view(options: argparse.Namespace) -> int:
     """Write the page of a run and open it in the browser; returns the exit code 0."""
     import webbrowser
 
-    from contactopt.figures.page import write_page
+    from contactopt.figures.view_page import write_page
 
     page = write_page(options.folder, options.out or Path(options.folder) / "view.html")
     if not options.no_open:
@@ -201,7 +201,7 @@ def new(options: argparse.Namespace) -> int:
 def bench(options: argparse.Namespace) -> int:
     """Execute the runs of an experiment file and write their report; returns the exit code, 130 if it was interrupted."""
     from contactopt.benchmark.campaign import run_campaign
-    from contactopt.benchmark.page import refusals, report_campaign
+    from contactopt.benchmark.report_page import refusals, report_campaign
     from contactopt.benchmark.store import load
 
     try:
@@ -232,7 +232,7 @@ def bench(options: argparse.Namespace) -> int:
 def report(options: argparse.Namespace) -> int:
     """Rebuild the reports of benchmarks from their tables; returns the exit code 0."""
     from contactopt.benchmark.campaign import run_reports
-    from contactopt.benchmark.page import report_campaign
+    from contactopt.benchmark.report_page import report_campaign
 
     folders = [Path(name) for name in options.names if Path(name).is_dir() and any(Path(name).glob("rows.*"))]
     if folders and len(folders) == len(options.names) and not options.run:

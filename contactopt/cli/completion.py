@@ -10,11 +10,11 @@ from __future__ import annotations
 import argparse
 
 from contactopt.bodies.solvers import SOLVERS
-from contactopt.problem.operators import FORMS
+from contactopt.linear.operators import FORMS
+from contactopt.methods import METHODS
+from contactopt.methods.backends import CONIC, QP
+from contactopt.methods.preconditioners import PRECONDITIONERS
 from contactopt.scenes import SCENES
-from contactopt.solving.backends import CONIC, QP
-from contactopt.solving.methods import METHODS
-from contactopt.solving.preconditioners import PRECONDITIONERS
 
 SHELLS = ("bash", "zsh", "fish", "tcsh")
 # what an argument takes besides what the parser knows: names, of which some are files

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from contactopt.bodies.solvers import SOLVERS
+from contactopt.linear.operators import FORMS
+from contactopt.methods import METHODS
+from contactopt.methods.backends import CONIC, QP
+from contactopt.methods.preconditioners import PRECONDITIONERS
 from contactopt.problem.laws import LAWS
-from contactopt.problem.operators import FORMS
 from contactopt.scenes import PATHS, SCENES
-from contactopt.solving.backends import CONIC, QP
-from contactopt.solving.methods import METHODS
-from contactopt.solving.preconditioners import PRECONDITIONERS
 
 
 def print_lists() -> None:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import argparse
 
 import contactopt
-from contactopt.analysis.places import PLACED
-from contactopt.analysis.quantities import READINGS
 from contactopt.benchmark.keys import help_text
 from contactopt.bodies.solvers import SOLVERS
 from contactopt.cli import commands
 from contactopt.cli.completion import SHELLS
 from contactopt.figures.style import FORMATS
-from contactopt.problem.operators import FORMS
+from contactopt.linear.operators import FORMS
+from contactopt.methods import METHODS
+from contactopt.methods.preconditioners import PRECONDITIONERS
+from contactopt.readings.places import PLACED
+from contactopt.readings.quantities import READINGS
 from contactopt.scenes import SCENES
-from contactopt.solving.methods import METHODS
-from contactopt.solving.preconditioners import PRECONDITIONERS
 
 EPILOG = """Examples:
   contactopt run punch-2d                      solve a scene; write numbers, figures and fields into out/punch-2d

@@ -1,6 +1,6 @@
 """Derivatives of certified solutions, and what is built on them: calibration and design.
 
-A solution (r, lambda) of an interface problem solves the equations of Newton's method (contactopt.solving.kernels.semismooth),
+A solution (r, lambda) of an interface problem solves the equations of Newton's method (contactopt.methods.kernels.semismooth),
 
     F(r, lambda; theta) = r - P(y; mu) = 0,   y = r - rho u,   u = Q r + V lambda + q,
     G(r, lambda; theta) = V' r + s = 0,

@@ -23,15 +23,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.checks import check_number, real_array
+from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.derivatives.constants import FIRST_RADIUS, GOOD, GROW, SHRINK, TAKEN
 from contactopt.derivatives.parameters import Parameter, parameters, put_all
 from contactopt.derivatives.states import Step
 from contactopt.errors import InputError
-from contactopt.interface.reduction import Reduction, reduce_bodies
+from contactopt.linear.operators import diagonal
+from contactopt.methods.driver import solve
 from contactopt.problem import Solution
-from contactopt.problem.operators import diagonal
 from contactopt.scenes.scene import Scene
-from contactopt.solving.driver import solve
 
 if TYPE_CHECKING:
     import cvxpy as cp

@@ -13,10 +13,10 @@ from contactopt.checks import check_number, real_array
 from contactopt.derivatives.kinks import Onesided, Weak, weak_contacts
 from contactopt.derivatives.linear import Tangent
 from contactopt.errors import InputError
+from contactopt.linear.operators import Interface, InterfaceOperator
+from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.problem import InterfaceProblem, Scales, Solution, dimensionless, natural_map_residual
-from contactopt.problem.operators import Interface, InterfaceOperator
 from contactopt.problem.scaling import immovable
-from contactopt.solving.kernels.alart_curnier import coulomb_equations
 
 CERTIFIED = 1e-5  # largest certificate of a solution whose derivative means anything
 NEAR = 1e-6  # distance to a kink, over the largest force, within which a contact is weakly active

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.problem.laws import Kinks, Law
+from contactopt.problem.laws.law import Kinks, Law
 
 STEP = 1e-7  # how far into a piece its derivative is read, over the largest force
 EXACT = 1e-6  # relative error of a one-sided derivative at the weakly active contacts

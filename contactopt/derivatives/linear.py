@@ -23,16 +23,16 @@ from scipy.sparse.linalg import LinearOperator, gmres, splu
 
 from contactopt.derivatives.constants import INNER, ROUND
 from contactopt.errors import InputError
+from contactopt.linear.flexible_gmres import flexible_gmres
+from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.saddle_point import CoupledForm
+from contactopt.linear.stacked import Stacked, Vector, norm
+from contactopt.methods.constants import LOOSE, SLIPPING
+from contactopt.methods.kernels.bonded import Bonded
+from contactopt.methods.kernels.coupled_newton import fitted
+from contactopt.methods.kernels.krylov import model_of
+from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.coupled import CoupledForm
-from contactopt.problem.operators import InterfaceOperator
-from contactopt.problem.stacked import Stacked, Vector, norm
-from contactopt.solving.constants import LOOSE, SLIPPING
-from contactopt.solving.kernels.bonded import Bonded
-from contactopt.solving.kernels.coupled import fitted
-from contactopt.solving.kernels.flexible import flexible_gmres
-from contactopt.solving.kernels.krylov import model_of
-from contactopt.solving.preconditioners import Preconditioner
 
 SINGULAR = 1e-13  # reciprocal condition of K below which it counts as singular
 UNSEEN = 1e-8  # relative residual up to which a singular system counts as solved
@@ -225,7 +225,7 @@ class Sparse:
 
 
 class Krylov:
-    """K by products with Q: GMRES, preconditioned by the same system with the model of Q (contactopt.solving.preconditioners)."""
+    """K by products with Q: GMRES, preconditioned by the same system with the model of Q (contactopt.methods.preconditioners)."""
 
     def __init__(self, tangent: Tangent, P: Preconditioner | None = None):
         self.tangent = tangent
@@ -265,7 +265,7 @@ class Krylov:
 
 
 class Coupled:
-    """K with the equilibrium of the bodies beside it, so that no product with Q is needed (contactopt.solving.kernels.coupled).
+    """K with the equilibrium of the bodies beside it, so that no product with Q is needed (contactopt.methods.kernels.coupled_newton).
 
     With Q = T A^-1 T' + R the unknowns X of the bodies are eliminated by A X = T' dr forward, by A X = -T' z in the adjoint.
     One flexible GMRES iteration sees bodies and contacts; one V-cycle per body stands for A^-1 in its preconditioner.

@@ -5,12 +5,12 @@
                                  of one pair of several as normal_force:PAIR
     resultant:PAIR:COMPONENT     of the contact forces on the upper body of a pair, in the coordinates of space [force]
     pressure:CONTACT             at one contact, by its number [stress]
-    pressure@X,Y                 at a place, and the stresses of contactopt.analysis.places: von_mises:BODY:BOUNDARY, ...
+    pressure@X,Y                 at a place, and the stresses of contactopt.readings.places: von_mises:BODY:BOUNDARY, ...
     energy                       elastic energy of all bodies [force length]
-    pressure, width, stick       the smooth readings of contactopt.analysis.quantities; of one pair of several pressure:PAIR
+    pressure, width, stick       the smooth readings of contactopt.readings.quantities; of one pair of several pressure:PAIR
 
 ROWS has one row for each. What it makes, a Quantity, is all that is known of it: how it is read, with its uncertainty and its
-local maxima (contactopt.analysis.quantities, contactopt.analysis.places), and its slopes.
+local maxima (contactopt.readings.quantities, contactopt.readings.places), and its slopes.
 
 A largest stress has the derivative of the stress at the place where it is largest. Pressure, width and stick are formulas over
 several forces. Their derivative by the force at each closed contact is a central difference of the reading, which solves
@@ -26,22 +26,22 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.edges import contact_edge, stick_edge
-from contactopt.analysis.places import PLACED, Place, map_of, place_of, pressure_weights, read_place, read_stress
-from contactopt.analysis.quantities import (
+from contactopt.coupling.reduction import Reduction
+from contactopt.derivatives.parameters import MATERIAL, Parameter
+from contactopt.derivatives.states import Seeds, Step
+from contactopt.errors import InputError
+from contactopt.problem import Solution
+from contactopt.problem.laws.law import Law
+from contactopt.readings.edges import contact_edge, stick_edge
+from contactopt.readings.places import PLACED, Place, map_of, place_of, pressure_weights, read_place, read_stress
+from contactopt.readings.quantities import (
     OF_ONE_PAIR,
     READINGS,
     Reading,
     elastic_energy,
     value_of,
 )
-from contactopt.analysis.resultants import views
-from contactopt.derivatives.parameters import MATERIAL, Parameter
-from contactopt.derivatives.states import Seeds, Step
-from contactopt.errors import InputError
-from contactopt.interface.reduction import Reduction
-from contactopt.problem import Solution
-from contactopt.problem.laws import Law
+from contactopt.readings.resultants import views
 from contactopt.scenes.scene import Scene
 
 STEP = 1e-5  # of a reading's central differences, over the force at the contact
@@ -296,7 +296,7 @@ def _stress(step: Step, place: Place) -> Seeds:
 
 
 def _reading(name: str, step: Step, pair: int) -> Seeds:
-    """A quantity of contactopt.analysis that reads the normal forces of one pair, at closed contacts."""
+    """A quantity of contactopt.readings that reads the normal forces of one pair, at closed contacts."""
     whole = replace(step.reduction, problem=step.problem)
     reduction, solution = views(whole, step.solution)[pair]
     read, r = partial(value_of, name), solution.reactions

@@ -1,7 +1,7 @@
 """Derivatives through the reduction and along load paths.
 
 At fixed contact forces r and multipliers lambda a parameter of the scene moves each body by dU_b, the relative displacement by
-du = sum B_b dU_b + dgap n, the balance by ds, and the law's parameter by dmu (contactopt.interface.reduction). A change dA of
+du = sum B_b dU_b + dgap n, the balance by ds, and the law's parameter by dmu (contactopt.coupling.reduction). A change dA of
 a stiffness acts like the load -dA U: dU = -C dA U, so that neither dC nor dQ is ever formed. What follows is the derivative of the
 interface problem by q, s and mu (contactopt.derivatives.interface).
 
@@ -22,17 +22,17 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.paths import PathResult
 from contactopt.checks import real_array
+from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.derivatives.interface import Change, Dual, Sensitivity, sensitivity
 from contactopt.derivatives.kinks import Weak
 from contactopt.derivatives.parameters import MATERIAL, Parameter
 from contactopt.errors import InputError
-from contactopt.interface.reduction import Reduction, reduce_bodies
+from contactopt.methods.driver import solve
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.laws import find_law
 from contactopt.scenes.scene import Scene
-from contactopt.solving.driver import solve
+from contactopt.solving.paths import PathResult
 
 Direction = Mapping[Parameter, Any]  # a number, or for a field one per contact
 

@@ -17,9 +17,9 @@ from scipy.sparse.linalg import splu
 
 from contactopt.errors import InputError
 from contactopt.fclib.text import compact
-from contactopt.files import whole_file
+from contactopt.files.writing import whole_file
+from contactopt.linear.operators import InterfaceOperator
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.operators import InterfaceOperator
 
 MAGIC = b"\x89HDF\r\n\x1a\n"  # the first bytes of an HDF5 file
 SMALL, PACKED = 2**20, 2000  # bytes that need not be in the file, and how much smaller compression can make others

@@ -14,8 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.errors import InputError
+from contactopt.linear.operators import Interface
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.operators import Interface
 
 DENSE, BLOCKS, SPARSE = range(3)  # storages
 MOSTLY = 1 / 3  # share of entries from which on a matrix is kept as an array

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.paths import PathResult
 from contactopt.figures.plots import contact_line, contact_place
 from contactopt.figures.style import BLUE, GREEN, GREY, ORANGE, make_axes
-from contactopt.files import whole_file
+from contactopt.files.writing import whole_file
+from contactopt.solving.paths import PathResult
 
 FRAMES = 10  # per second
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.bodies.elements import elements_of
+from contactopt.coupling.back_to_bodies import Fields
 from contactopt.figures.pieces import mesh_lines, outline, pieces, segments, surface, triangles
 from contactopt.figures.solids import View, draw_frame, picture
 from contactopt.figures.style import make_axes
-from contactopt.interface.recovery import Fields
+from contactopt.meshes.cells import elements_of
 from contactopt.problem import InterfaceProblem
 from contactopt.scenes.scene import Scene
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.files import whole_file
+from contactopt.files.writing import whole_file
 
 POLICY = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:"
 KINDS = {"f": ("f4", "<f4"), "i": ("i4", "<i4"), "u": ("i4", "<i4"), "b": ("i4", "<i4")}

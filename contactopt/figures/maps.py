@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.half_spaces import surface_maps
+from contactopt.coupling.reduction import Reduction
 from contactopt.figures.style import BLUE, ORANGE
-from contactopt.interface.reduction import Reduction
 from contactopt.problem import Solution
+from contactopt.readings.half_space_readings import surface_maps
 
 COLUMNS = 2  # of panels: more could not be read where the figure is 400 pixels wide
 

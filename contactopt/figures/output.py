@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.analysis.status import contact_status
-from contactopt.analysis.surfaces import contact_fields, on_nodes
 from contactopt.figures.style import FORMATS, save_figure
 from contactopt.problem import alone, part_of
+from contactopt.problem.contact_status import contact_status
+from contactopt.readings.contact_fields import contact_fields, on_nodes
 from contactopt.scenes.scene import HalfSpace
 
 if TYPE_CHECKING:
-    from contactopt.analysis.paths import PathResult
-    from contactopt.interface.recovery import Fields
+    from contactopt.coupling.back_to_bodies import Fields
     from contactopt.runner import Result
+    from contactopt.solving.paths import PathResult
 
 PAGE = "view.html"
 PICTURES = ("deformed", "maps", "pressure", "path", "refinement")
@@ -82,7 +82,7 @@ def draw(result: Result, folder: Path, formats: Sequence[str]) -> None:
 
         save(path_figure(result.path), "path")
     if result.estimate is not None:
-        from contactopt.figures.refinement import refinement_figure
+        from contactopt.figures.refined_meshes import refinement_figure
 
         save(refinement_figure(result.estimate), "refinement")
 

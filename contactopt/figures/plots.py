@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.analysis.edges import contact_area, contact_edge
-from contactopt.analysis.status import contact_status
 from contactopt.figures.bodies import deformed, magnification, mirror_plane
 from contactopt.figures.style import ARROWS, BLUE, GREEN, GREY, ORANGE, make_axes, singular
 from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem.contact_status import contact_status
+from contactopt.readings.edges import contact_area, contact_edge
 from contactopt.scenes.scene import Scene
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from contactopt.problem.certificate import balance_residual, fit_multipliers, na
 from contactopt.problem.chart import Chart
 from contactopt.problem.feasibility import Infeasible, infeasibility
 from contactopt.problem.interface_problem import InterfaceProblem
-from contactopt.problem.laws import LAWS, Law
+from contactopt.problem.laws import LAWS
+from contactopt.problem.laws.law import Law
 from contactopt.problem.pairs import Pair, alone, part_of
 from contactopt.problem.scaling import Scales, dimensionless
 from contactopt.problem.solution import Solution, Status

@@ -44,10 +44,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.errors import InputError
+from contactopt.linear.operators import diagonal
+from contactopt.linear.stacked import Stacked
 from contactopt.problem.cones import split
 from contactopt.problem.interface_problem import InterfaceProblem
-from contactopt.problem.operators import diagonal
-from contactopt.problem.stacked import Stacked
 
 ACTS = 1e-6  # share of the largest force from which on a contact's displacement counts fully in L
 ROUNDED = 1e-6  # share of a closed gap, or of a displacement that cancels, below which its remainder is rounding
@@ -61,7 +61,7 @@ class Moved:
 
     value     (k dim,) [length]
     accuracy  error of these displacements in the energy norm, relative to them: how far the bodies are from equilibrium
-    displacements  (N,) these displacements, the unknowns X of contactopt.problem.coupled [length]
+    displacements  (N,) these displacements, the unknowns X of contactopt.linear.saddle_point [length]
     """
 
     value: np.ndarray

@@ -141,3 +141,33 @@ class Chart:
         else:
             spacing[order] = 1.0
         return spacing
+
+
+def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
+    """Compute weights w of the contacts with diag(Q) about proportional to 1 / w^2.
+
+    A force that is spread over the area of a node makes a displacement proportional to 1 / length of the contact line
+    there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area / spacing on a line, sqrt(area) on a
+    surface.
+
+    Parameters
+    ----------
+    chart
+        The places of the k contacts on their surface [length].
+    areas
+        (k,) nodal areas [length^2].
+
+    Returns
+    -------
+    ndarray
+        (k,) positive weights [-]. The mean of w^2 is one.
+    """
+    if len(chart.places) == 2:
+        square = np.sqrt(areas)
+    else:
+        spacing = chart.spacing()
+        square = areas / np.where(spacing > 0, spacing, 1.0)
+    positive = square[square > 0]
+    # The node on an axis has no area; it gets a hundredth of the mean instead of an infinite diagonal.
+    square = np.maximum(square, 1e-2 * np.mean(positive) if len(positive) else 1.0)
+    return np.sqrt(square / np.mean(square))

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.linear.operators import InterfaceOperator, asymmetry
 from contactopt.problem.interface_problem import InterfaceProblem
-from contactopt.problem.operators import InterfaceOperator, asymmetry
 from contactopt.problem.scaling import dimensionless
 
 DIRECTIONS = 16  # of the polygon in each cone, in 3D

@@ -24,10 +24,10 @@ import scipy.sparse as sp
 from contactopt.cards import card, count, line
 from contactopt.checks import given, real_array
 from contactopt.errors import InputError
+from contactopt.linear.operators import Interface, InterfaceOperator, asymmetry, dense, diagonal, row_sizes, sparse
 from contactopt.problem.chart import Chart
-from contactopt.problem.laws import Law
 from contactopt.problem.laws.coulomb import Coulomb
-from contactopt.problem.operators import Interface, InterfaceOperator, asymmetry, dense, diagonal, row_sizes, sparse
+from contactopt.problem.laws.law import Law
 from contactopt.problem.pairs import Pair
 
 SYMMETRIC = 1e-2  # largest |Q - Q'|, over the largest |Q|, that counts as rounding of the code that wrote Q
@@ -205,7 +205,7 @@ class InterfaceProblem:
         Raises
         ------
         InputError
-            If that would be too large (contactopt.problem.operators.MOST_BYTES).
+            If that would be too large (contactopt.linear.operators.MOST_BYTES).
         """
         return self if isinstance(self.Q, np.ndarray) else replace(self, Q=dense(self.Q))
 

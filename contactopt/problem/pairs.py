@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactopt.linear.operators import block
 from contactopt.problem.chart import Chart
-from contactopt.problem.operators import block
 
 if TYPE_CHECKING:
     from contactopt.problem.interface_problem import InterfaceProblem

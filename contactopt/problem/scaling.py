@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.linear.operators import NOISE, Interface, InterfaceOperator, diagonal, row_sizes
 from contactopt.problem.interface_problem import InterfaceProblem
-from contactopt.problem.operators import NOISE, Interface, InterfaceOperator, diagonal, row_sizes
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from enum import Enum
 import numpy as np
 
 from contactopt.cards import card, count, line
+from contactopt.linear.stacked import Stacked
 from contactopt.problem.feasibility import Infeasible
-from contactopt.problem.stacked import Stacked
 
 
 class Status(Enum):
@@ -47,7 +47,7 @@ class Solution:
     notes        sentences about what the solve did otherwise than expected: a fallback, a stage that failed
     proof        status `infeasible`: the ray that proves that there is no solution
     displacements  of the bodies that are solved by iteration, from methods that work on them (the unknowns X of
-                 contactopt.problem.coupled) [length]; None from all others
+                 contactopt.linear.saddle_point) [length]; None from all others
     """
 
     reactions: np.ndarray

@@ -78,14 +78,14 @@ def pin_in_bush(
         return max(1, round(elements * np.pi * radius / (4 * exact.half_width)))
 
     def pin(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.scenes.meshes import rename
-        from contactopt.scenes.polar import right_half_disc
+        from contactopt.meshes.polar import right_half_disc
+        from contactopt.meshes.structured import rename
 
         return rename(right_half_disc(radius - clearance, sectors(elements)), contact="rim")
 
     def bush(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.scenes.meshes import rename
-        from contactopt.scenes.polar import even, ring
+        from contactopt.meshes.polar import even, ring
+        from contactopt.meshes.structured import rename
 
         parts = 4 * sectors(elements)
         angles = np.linspace(-np.pi / 2, np.pi / 2, parts + 1)
@@ -173,8 +173,8 @@ def press_fit(
     side = {"shaft": "outer", "hub": "inner"}
 
     def mesh(body: str, elements: int):  # type: ignore[no-untyped-def]
-        from contactopt.scenes.meshes import rename, tensor_mesh
-        from contactopt.scenes.polar import even, ring
+        from contactopt.meshes.polar import even, ring
+        from contactopt.meshes.structured import rename, tensor_mesh
 
         if kind == "plane-strain":
             made = ring(even(*limits[body], 2 * elements), np.linspace(0, np.pi / 2, elements + 1))
@@ -266,7 +266,7 @@ def stack(
 
     def mesh(level: int):  # type: ignore[no-untyped-def]
         def build(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-            from contactopt.scenes.meshes import rename, tensor_mesh
+            from contactopt.meshes.structured import rename, tensor_mesh
 
             rows = max(1, round(2 * elements * height / width))
             x, y = np.linspace(-width / 2, width / 2, 2 * elements + 1), np.linspace(0, height, rows + 1)
@@ -344,7 +344,7 @@ def arch(
 
     def mesh(number: int):  # type: ignore[no-untyped-def]
         def build(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-            from contactopt.scenes.polar import ring
+            from contactopt.meshes.polar import ring
 
             # An even number: the keystone has edges in the arch's plane of symmetry.
             rows = 2 * max(1, round(elements * np.pi * radius / stones / thickness))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.scenes.toml_table import Table
+from contactopt.files.toml_table import Table
 
 # names of units of length -> metres
 LENGTHS = {"nm": 1e-9, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
@@ -85,7 +85,7 @@ def _scale(body: Table, unit: str | None, length: str) -> float:
 
 
 def _from_file(body: Table, folder: Path, group: str | None, scale: float) -> Any:
-    from contactopt.scenes.mesh_files import load_mesh
+    from contactopt.meshes.mesh_files import load_mesh
 
     name = body.text("mesh")
     with body.about("group" if group else "mesh"):
@@ -112,7 +112,7 @@ def _counts(table: Table, names: tuple[str, ...]) -> list[int]:
 
 
 def _block(table: Table, components: tuple[str, ...]) -> Any:
-    from contactopt.scenes.meshes import rename, tensor_mesh
+    from contactopt.meshes.structured import rename, tensor_mesh
 
     sides = [_grid(table, c, f"two coordinates, [least {c}, largest {c}]") for c in components]
     counts = _counts(table, tuple(f"along {c}" for c in components))
@@ -123,7 +123,7 @@ def _block(table: Table, components: tuple[str, ...]) -> Any:
 
 
 def _ring(table: Table, components: tuple[str, ...]) -> Any:
-    from contactopt.scenes.polar import ring
+    from contactopt.meshes.polar import ring
 
     radii = _grid(table, "radii", "two radii, [inner, outer]")
     first, last = (
@@ -138,7 +138,7 @@ def _ring(table: Table, components: tuple[str, ...]) -> Any:
 
 
 def _disc(table: Table, components: tuple[str, ...]) -> Any:
-    from contactopt.scenes.polar import disc
+    from contactopt.meshes.polar import disc
 
     radius = table.number("radius", needed=True, low=0.0)
     (around,) = (
@@ -153,7 +153,7 @@ def _disc(table: Table, components: tuple[str, ...]) -> Any:
 
 def _named(mesh: Any, places: Table, components: tuple[str, ...]) -> Any:
     """The mesh with the boundaries that are named by where they are."""
-    from contactopt.scenes.mesh_files import name_boundaries
+    from contactopt.meshes.mesh_files import name_boundaries
 
     for name in places.data:
         place = places.table(name)

@@ -37,7 +37,7 @@ def with_elements(scene: Scene, degree: int | None = None, simplices: bool = Fal
             return part
 
         def mesh(elements: int, zone: float | None) -> Any:
-            from contactopt.scenes.meshes import simplices
+            from contactopt.meshes.structured import simplices
 
             return simplices(part.build_mesh(elements, zone))
 

@@ -26,7 +26,7 @@ class Contact:
     mu            what the law reads: the friction coefficient, for 'tresca' a bound of the tangential traction [stress]; a
                   number >= 0, one per contact (k,), or a function of the contacts' positions (dim, k) that gives either
     law           a name in contactopt.problem.laws.LAWS
-    coupling      a name in contactopt.interface.coupling.COUPLINGS, or 'auto' for the one that fits the surfaces
+    coupling      a name in contactopt.coupling.coupling.COUPLINGS, or 'auto' for the one that fits the surfaces
     carrier       the side whose nodes carry the contacts, 'upper' or 'lower', for couplings that can choose; None: the
                   coupling chooses
     """

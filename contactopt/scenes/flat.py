@@ -93,7 +93,7 @@ def flat_punch(
     a, up, growth = width / 2, "xyz"[dim - 1], GROWTH[dim]
 
     def punch_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.scenes.meshes import contact_grid, graded, rename, tensor_mesh
+        from contactopt.meshes.structured import contact_grid, graded, rename, tensor_mesh
 
         rise = graded(height, a / elements, growth)
         across = contact_grid(a, elements, a, growth)
@@ -101,7 +101,7 @@ def flat_punch(
         return rename(mesh, contact=f"{up}-", top=f"{up}+", **{f"symmetry {c}": f"{c}-" for c in "xy"[: dim - 1]})
 
     def foundation_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.scenes.meshes import contact_grid, graded, patch, rename, tensor_mesh
+        from contactopt.meshes.structured import contact_grid, graded, patch, rename, tensor_mesh
 
         depth_grid = -graded(foundation_height, a / elements, growth)[::-1]
         across = contact_grid(a, elements, foundation_width / 2, growth)
@@ -194,7 +194,7 @@ def rigid_punch(
     across, up = ("x", "y") if kind == "plane-strain" else ("r", "z")
 
     def mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.scenes.meshes import graded, patch, rename, tensor_mesh
+        from contactopt.meshes.structured import graded, patch, rename, tensor_mesh
 
         first = EDGE * half_width
         contact = _towards_edge(half_width, elements, first)

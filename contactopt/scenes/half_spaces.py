@@ -12,8 +12,8 @@ from contactopt.checks import check_count, check_number, check_positive
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.scenes.common import RUBBER, UNITS
+from contactopt.scenes.rough_surfaces import self_affine
 from contactopt.scenes.scene import HalfSpace, Rigid, Scene
-from contactopt.scenes.surfaces import self_affine
 
 WIDE = 1.25  # half side of the square of points, over the contact radius of Hertz
 
@@ -162,7 +162,7 @@ def rough(
     length
         Of each side.
     hurst, shortest, slope, seed
-        As for contactopt.scenes.surfaces.self_affine(); by default `shortest` is a sixteenth of the length.
+        As for contactopt.scenes.rough_surfaces.self_affine(); by default `shortest` is a sixteenth of the length.
     material
         Of the half-space.
     mu

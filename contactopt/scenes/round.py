@@ -33,7 +33,7 @@ def sphere(
     """A half sphere pressed on a foundation by a rigid plate glued to its flat face; axisymmetric.
 
     Lengths are in mm, forces in N and Young's moduli in MPa. The first contact zone is wider than that of Hertz, and
-    the zone loop (contactopt.analysis.zone) finds its edge.
+    the zone loop (contactopt.solving.zone) finds its edge.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def cylinder(
     modelled.
 
     Lengths are in mm, forces in N and Young's moduli in MPa. The first contact zone is wider than that of Hertz, and
-    the zone loop (contactopt.analysis.zone) finds its edge.
+    the zone loop (contactopt.solving.zone) finds its edge.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def _round_bodies(
         return _candidates(elements, min(zone or hertz.half_width, widest))
 
     def upper_mesh(elements: int, zone: float | None):  # type: ignore[no-untyped-def]
-        from contactopt.scenes.meshes import graded, half_sphere_section, patch
+        from contactopt.meshes.structured import graded, half_sphere_section, patch
 
         contact = candidates(elements, zone)
         grid = _beyond(contact, radius / sqrt(2))
@@ -308,14 +308,14 @@ def _candidates(elements: int, zone: float) -> np.ndarray:
 
 
 def _beyond(grid: np.ndarray, length: float) -> np.ndarray:
-    from contactopt.scenes.meshes import graded
+    from contactopt.meshes.structured import graded
 
     return np.concatenate([grid, grid[-1] + graded(length - grid[-1], grid[1] * GROWTH[2], GROWTH[2])[1:]])
 
 
 def _foundation_mesh(contact: np.ndarray, width: float, height: float):  # type: ignore[no-untyped-def]
     """Half of a foundation, the contact nodes at the given positions on its top."""
-    from contactopt.scenes.meshes import graded, patch, rename, tensor_mesh
+    from contactopt.meshes.structured import graded, patch, rename, tensor_mesh
 
     mesh = tensor_mesh(_beyond(contact, width), -graded(height, contact[1], GROWTH[2])[::-1])
     return patch(rename(mesh, axis="x-", bottom="y-", top="y+"), "top", "contact", [contact[-1]])

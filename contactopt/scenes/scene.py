@@ -15,8 +15,8 @@ import numpy as np
 from contactopt.checks import check_name, check_number, real_array, short
 from contactopt.errors import InputError
 from contactopt.material import Material
+from contactopt.meshes.given_curves import Curve
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.curves import Curve
 
 MOST_ACROSS = 100_000  # across the contact half-width
 LARGEST_VALUE = 1e100  # of forces, stresses and lengths: the squares of larger ones are no numbers

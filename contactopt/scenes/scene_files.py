@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import InputError
+from contactopt.files.toml_table import Table, read_table
 from contactopt.material import Material
 from contactopt.scenes.body_shapes import make_mesh
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.expressions import Expression
 from contactopt.scenes.scene import COMPONENTS, BodyForce, Part, Plate, Rigid, Scene, Support, Traction
-from contactopt.scenes.toml_table import Table, read_table
 
 SOLVE = ("method", "normal", "tangential", "preconditioner", "Q", "solver", "quantity")  # texts, as for contactopt.run
 

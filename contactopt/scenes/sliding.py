@@ -104,8 +104,8 @@ def cattaneo(
     stick, up = reference.stick_half_width or a, "xyz"[dim - 1]
 
     def mesh(elements: int, sign: float):  # type: ignore[no-untyped-def]
-        from contactopt.scenes.discs import extrude, half_disc
-        from contactopt.scenes.meshes import graded, tensor_mesh
+        from contactopt.meshes.discs import extrude, half_disc
+        from contactopt.meshes.structured import graded, tensor_mesh
 
         contact = _towards_edges(stick, a, elements, growth)
         reach, h = contact[-1], a / elements

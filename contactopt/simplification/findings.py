@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from contactopt.analysis.solve_scene import Solved
 from contactopt.cards import card, count, line
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import PROVED
 from contactopt.simplification.proof import Fold
+from contactopt.solving.solve_scene import Solved
 
 PARTS = {2: "half", 4: "quarter", 8: "eighth"}
 ROUNDING = 1e-10  # a smaller change between two solutions is rounding

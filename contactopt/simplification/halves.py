@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.bodies.elements import is_curved, straight
 from contactopt.errors import InputError
+from contactopt.meshes.cells import is_curved, straight
 from contactopt.scenes.scene import Part, Plate, Rigid, Scene, Support
 from contactopt.simplification.constants import NEAR
 from contactopt.simplification.images import Images, Plane
@@ -91,7 +91,7 @@ def roller(whole: Whole) -> str:
     """A support that holds one component of contacts in a plane across it; empty if there is none.
 
     In a scene of mirror images such a support is a plane of symmetry
-    (contactopt.interface.charts), in a whole scene it is not.
+    (contactopt.coupling.charts), in a whole scene it is not.
     """
     for name, part in whole.parts.items():
         mesh = whole.meshes[name]

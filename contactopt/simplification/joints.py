@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.constants import COARSEST
-from contactopt.analysis.quantities import elastic_energy
-from contactopt.analysis.solve_scene import Options, Solved, solve_scene
 from contactopt.problem import Pair
+from contactopt.readings.constants import COARSEST
+from contactopt.readings.quantities import elastic_energy
 from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import SHARE, SMOOTH
 from contactopt.simplification.findings import Simplification
 from contactopt.simplification.whole import sizes_of, with_pairs
+from contactopt.solving.solve_scene import Options, Solved, solve_scene
 
 ROUGH = Options(tol=1e-6)
 

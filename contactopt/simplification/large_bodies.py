@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.analysis.solve_scene import Solved
-from contactopt.analysis.status import contact_status
 from contactopt.bodies.elements import face_nodes
+from contactopt.problem.contact_status import contact_status
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 from contactopt.simplification.constants import ACROSS, FINITE, REACH, STEEP, WORST
 from contactopt.simplification.findings import Found, Simplification
 from contactopt.simplification.whole import lattice_points, sizes_of
+from contactopt.solving.solve_scene import Solved
 
 FLAT = 0.95  # cosine between the contact normals inside the contact and their mean, at least
 RINGS = 2.0  # contact half-widths about the middle whose gaps the polynomial follows

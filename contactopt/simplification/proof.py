@@ -22,15 +22,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
-from contactopt.analysis.solve_scene import Solved
 from contactopt.bodies import assemble
 from contactopt.bodies.body import Assembly
-from contactopt.interface.coupling import Coupling, couple
+from contactopt.coupling.coupling import Coupling, couple
 from contactopt.problem.certificate import Yardsticks, yardsticks
 from contactopt.problem.laws import make_law
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Rigid, Scene
 from contactopt.simplification.constants import NEAR
+from contactopt.solving.solve_scene import Solved
 
 Key = tuple[str, str]  # ("body", its name) or ("pair", its name)
 # ("body" or "pair", name), points (dim, k) of the larger scene -> the same of the smaller one, and matrices (k, dim, dim')

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from contactopt.analysis.solve_scene import Options, Solved
-from contactopt.analysis.zone import solve_zone
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import MOST, PROVED
@@ -17,6 +15,8 @@ from contactopt.simplification.mirrors import mirrored
 from contactopt.simplification.proof import certificate_of_whole
 from contactopt.simplification.sections import section
 from contactopt.simplification.whole import sizes_of, whole_of
+from contactopt.solving.solve_scene import Options, Solved
+from contactopt.solving.zone import solve_zone
 
 
 def simplify(scene: Scene, solve: bool = True) -> Simplified:

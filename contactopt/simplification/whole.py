@@ -11,7 +11,7 @@ import numpy as np
 import skfem
 
 from contactopt.bodies.body import check_mesh
-from contactopt.bodies.elements import SHAPES
+from contactopt.meshes.cells import SHAPES
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 from contactopt.simplification.constants import BETWEEN

@@ -1,1 +1,1 @@
-"""Solution of interface problems: the driver, the methods, their backends and preconditioners. No body is known here."""
+"""One place solves a scene; the contact zone, the load path and several meshes are loops around it."""

@@ -8,12 +8,12 @@ import numpy as np
 
 from contactopt import InterfaceProblem
 from contactopt.benchmark import method
+from contactopt.methods.backends import CONIC, QP, TIGHT, find
+from contactopt.methods.backends.conic import DiscSOCP
+from contactopt.methods.backends.qp import BoxQP
+from contactopt.methods.kernels.semismooth import crossover
 from contactopt.problem import dimensionless
 from contactopt.problem.cones import disc_derivative, half_line_derivative
-from contactopt.solving.backends import CONIC, QP, TIGHT, find
-from contactopt.solving.backends.conic import DiscSOCP
-from contactopt.solving.backends.qp import BoxQP
-from contactopt.solving.kernels.semismooth import crossover
 
 LOOPS = {"max_iter", "max_iters"}  # kept at the backend's default settings too: iterations are no matter of accuracy
 

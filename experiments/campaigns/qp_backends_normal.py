@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactopt.benchmark.figures import fitted_exponent
+from contactopt.benchmark.report_figures import fitted_exponent
 from contactopt.benchmark.tables import groups, time_table
 
 

@@ -20,7 +20,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 from contactopt import BodyForce, Contact, Material, Part, Plate, Rigid, Scene, reduce_bodies, solve  # noqa: E402
-from contactopt.scenes.meshes import rename, tensor_mesh  # noqa: E402
+from contactopt.meshes.structured import rename, tensor_mesh  # noqa: E402
 from experiments.report import write  # noqa: E402
 
 BODIES = (2, 4, 8, 16, 32)

@@ -24,8 +24,8 @@ from typing import Any  # noqa: E402
 import numpy as np  # noqa: E402
 
 from contactopt import Material, Scene, Solution, scenes, solve  # noqa: E402
-from contactopt.interface.recovery import recover  # noqa: E402
-from contactopt.interface.reduction import Reduction, reduce_bodies  # noqa: E402
+from contactopt.coupling.back_to_bodies import recover  # noqa: E402
+from contactopt.coupling.reduction import Reduction, reduce_bodies  # noqa: E402
 from experiments.questions.calculix.deck import LEAST, TENSION, Contact, deck, model  # noqa: E402
 from experiments.questions.calculix.run import MU, STICK, STIFF, peak_memory, penalty, printed, punch  # noqa: E402
 from experiments.report import write  # noqa: E402

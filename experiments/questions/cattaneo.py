@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import scenes
-from contactopt.analysis.paths import PathResult, follow
 from contactopt.analytic import contact_modulus, cycle_loss_line, cycle_loss_point, tangential_modulus
 from contactopt.figures.plots import BLUE, GREY, ORANGE
 from contactopt.scenes.scene import Part, Scene
+from contactopt.solving.paths import PathResult, follow
 from experiments.report import write
 
 FORCE, MU, DEPTH, RADIUS = 100.0, 0.5, 400.0, 10000.0  # the scenes' defaults; RADIUS in 3D

@@ -16,9 +16,9 @@ from typing import Any  # noqa: E402
 import numpy as np  # noqa: E402
 
 from contactopt import InterfaceProblem, natural_map_residual, reduce, solve  # noqa: E402
+from contactopt.methods.auto import Auto  # noqa: E402
 from contactopt.problem import dimensionless  # noqa: E402
 from contactopt.scenes import make_scene  # noqa: E402
-from contactopt.solving.methods.auto import Auto  # noqa: E402
 from experiments.report import write  # noqa: E402
 
 SCENES = ("punch-2d", "sphere", "punch-3d")

@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import scenes
-from contactopt.analysis.paths import PathResult, follow
-from contactopt.bodies.elements import elements_of
+from contactopt.coupling.back_to_bodies import recover
 from contactopt.figures.pieces import outline, pieces, triangles
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
-from contactopt.interface.recovery import recover
+from contactopt.meshes.cells import elements_of
+from contactopt.solving.paths import PathResult, follow
 from experiments.report import REPORTS
 
 SHEAR = 40.0  # N of the 50 N at which the cylinder would slide

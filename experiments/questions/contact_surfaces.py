@@ -20,9 +20,9 @@ from skfem import MeshQuad, MeshTet
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce_bodies
 from contactopt.figures.plots import BLUE, GREY, ORANGE
-from contactopt.scenes.meshes import graded
-from contactopt.solving.preconditioners import deflated, preconditioner, smooth_motions
-from contactopt.solving.preconditioners import surface as surface_room
+from contactopt.meshes.structured import graded
+from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
+from contactopt.methods.preconditioners import surface as surface_room
 from experiments.questions.preconditioners import condition, iterations
 from experiments.report import markdown, write
 
@@ -213,7 +213,7 @@ TEXT = """Does the preconditioner `laplacian` work on contact surfaces of any sh
 surface. gmsh meshed this surface with triangles, and each stub has a column of tetrahedra over each triangle. In the plane a pin sits in a bush. The table has condition numbers of
 the whole operator, with normal and tangential components together. It also has the iterations of conjugate gradients from a random
 right-hand side to 1e-8. `deflated` means that constant and linear motions are solved for exactly. The only number that was fitted to
-stubs is ALONG (`contactopt/solving/preconditioners/constants.py`), and it was fitted on the disc.
+stubs is ALONG (`contactopt/methods/preconditioners/constants.py`), and it was fitted on the disc.
 
 1. With deflation, the worst surface that was not fitted on is {worst}, with the condition number {most:.1f}. No surface takes more than {steps} iterations. On the disc
    the condition numbers are {disc}. {beyond}

@@ -16,7 +16,7 @@ from contactopt import Scene, scenes, solve
 from contactopt.bodies.body import Assembly, build_body
 from contactopt.bodies.solvers import make_solver
 from contactopt.bodies.solvers.system import System
-from contactopt.interface.reduction import reduce_bodies
+from contactopt.coupling.reduction import reduce_bodies
 from experiments.report import merged, write
 
 REPEATS = 3

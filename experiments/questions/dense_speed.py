@@ -15,12 +15,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from contactopt.methods.apg import disc_qp
+from contactopt.methods.backends import CONIC, QP, Backend
+from contactopt.methods.backends.conic import DiscSOCP
+from contactopt.methods.backends.qp import BoxQP
+from contactopt.methods.kernels.mprgp import box_qp, mprgp
 from contactopt.problem.cones import disc
-from contactopt.solving.backends import CONIC, QP, Backend
-from contactopt.solving.backends.conic import DiscSOCP
-from contactopt.solving.backends.qp import BoxQP
-from contactopt.solving.kernels.mprgp import box_qp, mprgp
-from contactopt.solving.methods.apg import disc_qp
 from experiments.report import write
 
 REPEATS = 3

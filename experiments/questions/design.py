@@ -9,7 +9,7 @@ import numpy as np
 
 import contactopt
 from contactopt import HalfSpace, Material, Part, Rigid, Scene, Support
-from contactopt.scenes.meshes import graded, rename, tensor_mesh
+from contactopt.meshes.structured import graded, rename, tensor_mesh
 from experiments.report import write
 
 HALF, FORCE, MATERIAL = 10.0, 100.0, Material(5.0, 0.3)

@@ -15,11 +15,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import Material, Part, Rigid, Scene, Support, reduce_bodies, solve
-from contactopt.analysis.edges import contact_edge
 from contactopt.analytic import contact_modulus, flat_punch_axisymmetric, hertz_point
 from contactopt.bodies import elements
 from contactopt.figures.plots import BLUE, GREY, ORANGE
-from contactopt.scenes.meshes import patch, rename, simplices, tensor_mesh
+from contactopt.meshes.structured import patch, rename, simplices, tensor_mesh
+from contactopt.readings.edges import contact_edge
 from experiments.report import write
 
 RUBBER, RADIUS = Material(5.0, 0.3), 50.0  # MPa; of the sphere, in contact half-widths

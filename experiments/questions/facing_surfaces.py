@@ -16,8 +16,8 @@ from skfem.quadrature import get_quadrature
 from contactopt import BodyForce, Material, Part, Scene, Support, load_mesh, reduce_bodies, solve
 from contactopt.analytic import Reference, contact_modulus, hertz_line, hertz_point, pin_in_hole
 from contactopt.bodies.elements import FACES
-from contactopt.interface.faces import Faces, cross, faces_of
-from contactopt.interface.mortar import mortar
+from contactopt.coupling.faces import Faces, cross, faces_of
+from contactopt.coupling.mortar import mortar
 from experiments.report import markdown, write
 
 PAIRS = 1000

@@ -20,9 +20,9 @@ import numpy as np
 
 from contactopt import BodyForce, HalfSpace, InputError, Material, Part, Rigid, Scene, Support, Traction, load_mesh
 from contactopt.accuracy import refine
-from contactopt.analysis.limits import Limits
-from contactopt.analysis.solve_scene import solve_scene
 from contactopt.derivatives.outputs import find_quantity
+from contactopt.solving.limits import Limits
+from contactopt.solving.solve_scene import solve_scene
 from experiments.questions.adaptivity.parts import rounded, save
 from experiments.report import write
 

@@ -29,7 +29,7 @@ from contactopt import (  # noqa: E402
     reduce_bodies,
     solve,
 )
-from contactopt.scenes.meshes import rename, tensor_mesh  # noqa: E402
+from contactopt.meshes.structured import rename, tensor_mesh  # noqa: E402
 from experiments.report import write  # noqa: E402
 
 COUNT = 250  # problems in the plane, and as many in space

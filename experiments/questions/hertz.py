@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import reduce, scenes, solve
-from contactopt.analysis.edges import contact_edge, equivalent_half_width
-from contactopt.analysis.status import contact_status
-from contactopt.analysis.zone import solve_zone
 from contactopt.figures.plots import BLUE, GREY, ORANGE
+from contactopt.problem.contact_status import contact_status
+from contactopt.readings.edges import contact_edge, equivalent_half_width
 from contactopt.scenes.scene import Scene
+from contactopt.solving.zone import solve_zone
 from experiments.report import write
 
 ELEMENTS = (8, 16, 32, 64, 128)

@@ -28,7 +28,7 @@ import numpy as np  # noqa: E402
 import scipy.sparse as sp  # noqa: E402
 
 import contactopt as co  # noqa: E402
-from contactopt.solving.methods import METHODS  # noqa: E402
+from contactopt.methods import METHODS  # noqa: E402
 
 CASES, PROCESSES = 5000, 2
 LIMIT, SLACK = 0.3, 1.0  # seconds

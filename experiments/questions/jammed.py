@@ -15,10 +15,10 @@ from typing import Any  # noqa: E402
 import numpy as np  # noqa: E402
 
 from contactopt import InterfaceProblem, solve  # noqa: E402
+from contactopt.methods.kernels.homotopy import homotopy_iterates  # noqa: E402
+from contactopt.methods.kernels.interior import Path, interior_iterates  # noqa: E402
+from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix  # noqa: E402
 from contactopt.problem import dimensionless  # noqa: E402
-from contactopt.solving.kernels.homotopy import homotopy_iterates  # noqa: E402
-from contactopt.solving.kernels.interior import Path, interior_iterates  # noqa: E402
-from contactopt.solving.kernels.sparse_blocks import Blocks, block_matrix  # noqa: E402
 from experiments.questions.granular import packing  # noqa: E402
 from experiments.report import write  # noqa: E402
 
@@ -71,7 +71,7 @@ def measure(dim: int, bodies: int, points: int, mu: float) -> dict[str, Any]:
 
 
 TEXT = """Packings of {seeds} seeds in each row. How many end at a solution: on the two interior-point paths that the default method begins with,
-and on the path that turns back where it must (`contactopt.solving.kernels.homotopy`, at most {systems} linear systems), with an error of
+and on the path that turns back where it must (`contactopt.methods.kernels.homotopy`, at most {systems} linear systems), with an error of
 at most {reached:g}; and how many the default method certifies within {limit} iterations. Medians of processor seconds, one thread.
 
 {{rows}}

@@ -21,12 +21,12 @@ from matplotlib.figure import Figure
 
 from contactopt import scenes, solve
 from contactopt.bodies import assemble
-from contactopt.bodies.concurrency import each
+from contactopt.coupling.back_to_bodies import recover
+from contactopt.coupling.reduction import reduce_bodies
 from contactopt.figures.plots import BLUE, GREY, ORANGE
-from contactopt.interface.recovery import recover
-from contactopt.interface.reduction import reduce_bodies
+from contactopt.linear.concurrency import each
+from contactopt.linear.threads import one_blas_thread
 from contactopt.problem.laws.coulomb import Coulomb
-from contactopt.problem.threads import one_blas_thread
 from experiments.report import REPORTS, markdown, merged, write
 
 SIZES = (20, 32, 48, 64, 92)  # elements across the half-width of the punch

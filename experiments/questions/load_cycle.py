@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from contactopt import scenes
-from contactopt.analysis.paths import PathResult, follow
 from contactopt.figures.animation import animate, energies, loop
 from contactopt.figures.plots import BLUE, GREY, ORANGE
+from contactopt.solving.paths import PathResult, follow
 from experiments.questions.cattaneo import exact_loss, loop_area
 from experiments.report import REPORTS, write
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contactopt import Material, Part, Plate, Scene, Support, reduce, solve
-from contactopt.scenes.meshes import rename, tensor_mesh
+from contactopt.meshes.structured import rename, tensor_mesh
 from experiments.report import write
 
 COMPONENTS = {"plane-strain": "xy", "axisymmetric": "rz", "solid": "xyz"}

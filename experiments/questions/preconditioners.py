@@ -13,9 +13,9 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce, scenes, solve
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
-from contactopt.problem.operators import Interface
-from contactopt.scenes.meshes import graded, rename, tensor_mesh
-from contactopt.solving.preconditioners import (
+from contactopt.linear.operators import Interface
+from contactopt.meshes.structured import graded, rename, tensor_mesh
+from contactopt.methods.preconditioners import (
     PRECONDITIONERS,
     Preconditioner,
     deflated,

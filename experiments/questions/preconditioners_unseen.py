@@ -8,14 +8,14 @@ from unittest.mock import patch
 import numpy as np
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce
-from contactopt.scenes.meshes import graded, rename, simplices, tensor_mesh
-from contactopt.solving.preconditioners import deflated, preconditioner, smooth_motions
+from contactopt.meshes.structured import graded, rename, simplices, tensor_mesh
+from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
 from experiments.questions.preconditioners import blocks, condition, iterations, solids
 from experiments.report import write
 
 RUBBER = Material(5.0, 0.3)
 EVEN = np.linspace(-2.0, 2.0, 65)
-ROOM = "contactopt.solving.preconditioners"
+ROOM = "contactopt.methods.preconditioners"
 # The same numbers as a half-space and slowly varying meshes have them, without any fit.
 UNFITTED = {f"{ROOM}.neumann": {"DISPERSION": 0.0}, f"{ROOM}.grid": {"CELL": 0.5, "EDGE": 0.0}}
 CHOICES = ("none", "p21", "neumann, no constant fitted", "neumann")
@@ -152,7 +152,7 @@ def helped(rows: list[dict[str, object]]) -> str:
     return f"{better} of {len(pairs)}"
 
 
-TEXT = """Does the preconditioner `neumann` also work on bodies that it was not fitted on? Its constants (`contactopt/solving/preconditioners/constants.py`)
+TEXT = """Does the preconditioner `neumann` also work on bodies that it was not fitted on? Its constants (`contactopt/methods/preconditioners/constants.py`)
 were fitted on the bodies of [Preconditioners](../preconditioners.md). Here it meets bodies that had no part in the fit. The entries are condition
 numbers, with the iterations of preconditioned conjugate gradients from a random right-hand side to 1e-8 in brackets. Smooth motions are
 deflated (solved for exactly), except in the column "none".

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 
 from contactopt import InterfaceProblem, reduce, scenes, solve
-from contactopt.solving.backends import QP
-from contactopt.solving.kernels import splitting
+from contactopt.methods.backends import QP
+from contactopt.methods.kernels import splitting
 from experiments.report import write
 
 REPEATS = 5
@@ -44,7 +44,7 @@ def without_crossover(name: str, problem):  # type: ignore[no-untyped-def]
 
 
 def as_it_comes(solvers, equations):  # type: ignore[no-untyped-def]
-    """The first answer of the first try, in place of contactopt.solving.kernels.semismooth.certified."""
+    """The first answer of the first try, in place of contactopt.methods.kernels.semismooth.certified."""
     r, multipliers = next(iter(solvers))[1]()
     return r.reshape(equations.q.shape), multipliers
 
@@ -64,7 +64,7 @@ def in_all_units(name: str) -> dict[str, object]:
 
 
 TEXT = """Do all solvers of quadratic programs lead to the same answer? The problem is the default `punch-2d` (17 contacts, mu = .5). The same backend
-solves its normal and its tangential problem, at the tight settings of contactopt.solving.backends. The answer is certified at
+solves its normal and its tangential problem, at the tight settings of contactopt.methods.backends. The answer is certified at
 1e-9. Differences are relative to a solve at 1e-13. contactopt makes the answer of a backend exact by a few more steps, which is called
 crossover. "Without crossover" takes the answers of the backend as they come, for at most 40 iterations.
 

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from contactopt import Scene, reduce, reduce_bodies, scenes, solve
-from contactopt.analysis.solve_scene import Options, Solved, solve_scene
 from contactopt.bodies.launch import mpiexec
 from contactopt.bodies.ranks import Kept, Team, serve, spread, world
 from contactopt.scenes.slices import sliced
+from contactopt.solving.solve_scene import Options, Solved, solve_scene
 from experiments.report import write
 
 TOL = 1e-8

@@ -19,7 +19,7 @@ from concurrent.futures import ProcessPoolExecutor  # noqa: E402
 import numpy as np  # noqa: E402
 
 from contactopt import InterfaceProblem, Solution, solve  # noqa: E402
-from contactopt.problem.operators import dense  # noqa: E402
+from contactopt.linear.operators import dense  # noqa: E402
 from experiments.questions.coulomb_check import violations  # noqa: E402
 
 METHODS = ("auto", "auto", "newton", "proximal", "nsgs")

@@ -14,10 +14,10 @@ from scipy.sparse.linalg import LinearOperator, cg
 from skfem import MeshHex, MeshQuad
 
 from contactopt import Contact, Material, Part, Scene, Support, reduce, scenes, solve
+from contactopt.linear.operators import held
+from contactopt.methods.preconditioners import Preconditioner, deflated, degrees, preconditioner, smooth_motions
 from contactopt.problem import InterfaceProblem, dimensionless
-from contactopt.problem.operators import held
 from contactopt.scenes.slices import sliced
-from contactopt.solving.preconditioners import Preconditioner, deflated, degrees, preconditioner, smooth_motions
 from experiments.report import write
 
 RATIOS = (1e-4, 1.0, 1e4)  # stiffness of every other block over that of the ones between

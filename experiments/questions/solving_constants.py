@@ -1,4 +1,4 @@
-"""What is each number of contactopt.solving.constants worth? Half and twice of it, one at a time, over problems of several kinds.
+"""What is each number of contactopt.methods.constants worth? Half and twice of it, one at a time, over problems of several kinds.
 
 Names of constants after the command choose some of them. Their rows are then printed, and no report is written.
 """
@@ -18,9 +18,8 @@ from importlib import import_module  # noqa: E402
 from typing import Any  # noqa: E402
 
 from contactopt import InterfaceProblem, reduce, scenes, solve  # noqa: E402
-from contactopt.solving import constants  # noqa: E402
-from contactopt.solving.methods import find_method  # noqa: E402
-from contactopt.solving.methods.nested import Nested  # noqa: E402
+from contactopt.methods import constants, find_method  # noqa: E402
+from contactopt.methods.nested import Nested  # noqa: E402
 from experiments.questions.granular import packing  # noqa: E402
 from experiments.questions.robustness import rigid_bodies  # noqa: E402
 from experiments.report import write  # noqa: E402
@@ -136,7 +135,7 @@ def measure(chosen: list[str]) -> list[dict[str, Any]]:
     return rows
 
 
-TEXT = """Every number of `contactopt.solving.constants` at half and at twice its value, one at a time: how many problems are certified
+TEXT = """Every number of `contactopt.methods.constants` at half and at twice its value, one at a time: how many problems are certified
 (residual at most 1e-8, at most {limit} iterations), and the processor time over that with the value itself. Of shares near one the
 distance from one is halved and doubled. The problems: {elastic} of elastic
 bodies (`punch-2d` and `sphere`, of which the {coarse} coarse ones for `apg`), {rigid} of random rigid bodies, {packing} packings of rigid bodies with a sparse Q, {products} of elastic bodies known by products

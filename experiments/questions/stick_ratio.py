@@ -7,10 +7,10 @@ import time
 from matplotlib.figure import Figure
 
 from contactopt import Material, reduce, scenes, solve
-from contactopt.analysis.edges import equivalent_half_width
-from contactopt.analysis.status import contact_status
 from contactopt.analytic import dundurs, stick_ratio
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
+from contactopt.problem.contact_status import contact_status
+from contactopt.readings.edges import equivalent_half_width
 from experiments.report import write
 
 EXACT = stick_ratio(0.3, dundurs(None, Material(1.0, 0.3))[1])  # plane strain, mu = nu = .3

@@ -1,7 +1,7 @@
 """Which way to the solution is cheapest: a dense Q, products with Q by factors, or bodies and contact at once by multigrid?
 
 `python -m experiments.questions.ways` measures all ways on punches of growing size, fits the estimates of
-contactopt.interface.costs to them and draws both as maps. `--fit` fits and draws what was measured before.
+contactopt.coupling.costs to them and draws both as maps. `--fit` fits and draws what was measured before.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 from scipy.optimize import nnls
 
 from contactopt import reduce_bodies, scenes, solve
+from contactopt.coupling.costs import MOST_EXPLICIT, WAYS, seconds, terms
 from contactopt.figures.plots import BLUE, GREEN, ORANGE
-from contactopt.interface.costs import MOST_EXPLICIT, WAYS, seconds, terms
 from experiments.report import REPORTS, number, write
 
 SIZES = {2: (64, 128, 256, 512, 1024), 3: (6, 8, 12, 16, 20, 26)}  # elements across the half-width
@@ -124,7 +124,7 @@ machine. n is the number of unknowns of the larger body, and m is the number of 
 
 {{rows}}
 
-`contactopt/interface/costs.py` estimates the costs. Each estimate is a sum of the terms there (`terms`), with the prices of this table. The
+`contactopt/coupling/costs.py` estimates the costs. Each estimate is a sum of the terms there (`terms`), with the prices of this table. The
 prices were fitted to the measured times.
 
 {{fits}}

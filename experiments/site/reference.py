@@ -17,10 +17,10 @@ from docstrings import as_rst
 
 import contactopt
 from contactopt.bodies.solvers import SOLVERS
+from contactopt.methods import METHODS
+from contactopt.methods.backends import CONIC, QP
+from contactopt.methods.preconditioners import PRECONDITIONERS
 from contactopt.scenes import PATHS, SCENES
-from contactopt.solving.backends import CONIC, QP
-from contactopt.solving.methods import METHODS
-from contactopt.solving.preconditioners import PRECONDITIONERS
 
 Pages = Iterator[tuple[Path, str | Path]]
 
@@ -138,7 +138,7 @@ def plug_in_pages(site: Path) -> Pages:
         "scenes": f"# Named scenes\n\n{SCENES_TEXT}\n{scenes_table()}",
         "methods": methods_index(),
         "laws": described("Friction laws", LAWS_TEXT, optional("contactopt.problem.laws", "LAWS")),
-        "couplings": described("Couplings", COUPLINGS_TEXT, optional("contactopt.interface.coupling", "COUPLINGS")),
+        "couplings": described("Couplings", COUPLINGS_TEXT, optional("contactopt.coupling.coupling", "COUPLINGS")),
         "preconditioners": described("Preconditioners", PRECONDITIONERS_TEXT, PRECONDITIONERS),
         "body_solvers": described("Solvers of the bodies", SOLVERS_TEXT, SOLVERS),
         "backends": f"# Backends\n\n{BACKENDS_TEXT}\n{backends_tables()}",

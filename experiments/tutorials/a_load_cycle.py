@@ -14,8 +14,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import scenes
-from contactopt.analysis.paths import follow
 from contactopt.analytic import cycle_loss_line
+from contactopt.solving.paths import follow
 
 # %% [markdown]
 # ## From one step to a path

@@ -43,7 +43,7 @@ FIRST = """
 import numpy as np
 
 from contactopt import natural_map_residual
-from contactopt.solving.kernels.balance import project_balanced
+from contactopt.methods.kernels.balance import project_balanced
 from contactopt.benchmark import method, problem
 from contactopt.problem.cones import coulomb_cone_derivative
 

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from contactopt import Material, Part, Scene, Support, reduce, reduce_bodies
-from contactopt.scenes.meshes import graded, rename, tensor_mesh
+from contactopt.meshes.structured import graded, rename, tensor_mesh
 
 # %% [markdown]
 # ## Two springs

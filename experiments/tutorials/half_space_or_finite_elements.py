@@ -167,7 +167,7 @@ assert abs(approach[-1] - 1) < 0.05
 #
 # ```python
 # from contactopt import reduce_bodies
-# from contactopt.analysis.half_spaces import subsurface_stress
+# from contactopt.readings.half_space_readings import subsurface_stress
 #
 # made = reduce_bodies(on_half_space(64))
 # depths = a * np.linspace(0.3, 0.7, 21)

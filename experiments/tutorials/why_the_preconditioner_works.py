@@ -15,8 +15,8 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt import Material, Part, Scene, Support, reduce
-from contactopt.scenes.meshes import graded, rename, tensor_mesh
-from contactopt.solving.preconditioners import preconditioner
+from contactopt.meshes.structured import graded, rename, tensor_mesh
+from contactopt.methods.preconditioners import preconditioner
 
 # %% [markdown]
 # ## The problem of size
@@ -210,7 +210,7 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(motion[:
 # For all three, one eigenvalue stands apart on the right. It belongs to the *sway* of the punch, a motion of the whole
 # body. The symbol describes waves on the surface, and does not contain this motion. CG needs only one or two more iterations
 # to deal with a single eigenvalue. So the condition number looks worse than CG really is. It still pays to solve for such a
-# motion exactly (`contactopt.solving.preconditioners.deflated`), as the last exercise shows.
+# motion exactly (`contactopt.methods.preconditioners.deflated`), as the last exercise shows.
 #
 # ## Exercises
 #
@@ -256,7 +256,7 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(motion[:
 # <details><summary>Solution</summary>
 #
 # ```python
-# from contactopt.solving.preconditioners import deflated, smooth_motions
+# from contactopt.methods.preconditioners import deflated, smooth_motions
 # P = preconditioner(problem, "p21")
 # exact_on_smooth = deflated(P, problem.Q, smooth_motions(problem))
 # assert iterations(problem.Q, exact_on_smooth) < counts["p21"][nodes]

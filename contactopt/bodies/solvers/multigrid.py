@@ -22,9 +22,8 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from contactopt.bodies.concurrency import Crew
 from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST_ITERATIONS, NEAR, RTOL
-from contactopt.bodies.solvers.products import BlockProduct, SparseProduct, galerkin
+from contactopt.bodies.solvers.sparse_products import BlockProduct, SparseProduct, galerkin
 from contactopt.bodies.solvers.system import (
     Block,
     Iteration,
@@ -35,7 +34,8 @@ from contactopt.bodies.solvers.system import (
 )
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
-from contactopt.problem.operators import Product
+from contactopt.linear.concurrency import Crew
+from contactopt.linear.operators import Product
 
 SINGLE = np.float32
 PIECES = 16  # in which the rows of a matrix are brought into blocks

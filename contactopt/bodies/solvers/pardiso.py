@@ -17,7 +17,7 @@ from contactopt.bodies.solvers.system import (
     triangle_product,
 )
 from contactopt.errors import InputError
-from contactopt.problem.operators import Product
+from contactopt.linear.operators import Product
 
 
 class PardisoSolver:

@@ -19,7 +19,7 @@ from contactopt.bodies.solvers.multigrid import nodal_blocks, rigid_motions
 from contactopt.bodies.solvers.system import Iteration, System, asked, block_product, inverse_block
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
-from contactopt.problem.operators import Product
+from contactopt.linear.operators import Product
 
 ALONE = threading.RLock()  # PETSc does not allow calls from two threads at the same time
 

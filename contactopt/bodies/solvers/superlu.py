@@ -22,7 +22,7 @@ from contactopt.bodies.solvers.system import (
     triangle_inverse,
     triangle_product,
 )
-from contactopt.problem.operators import Product
+from contactopt.linear.operators import Product
 
 
 class FactorThread:

@@ -11,7 +11,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from contactopt.errors import InputError
-from contactopt.problem.operators import Product
+from contactopt.linear.operators import Product
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative, split, unit
-from contactopt.problem.laws import Kinks, Law, Projected
+from contactopt.problem.laws.law import Kinks, Law, Projected
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.problem.cones import cylinder_derivative, disc, disc_of_height, split, unit
-from contactopt.problem.laws import Law, Projected
+from contactopt.problem.laws.law import Law, Projected
 
 
 @dataclass(frozen=True, eq=False)

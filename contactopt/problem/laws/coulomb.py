@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative, disc_of_height, split, unit
-from contactopt.problem.laws import Law, Projected
+from contactopt.problem.laws.law import Law, Projected
 
 
 @dataclass(frozen=True, eq=False)

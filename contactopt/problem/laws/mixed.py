@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.problem.laws import Kinks, Law, Projected
+from contactopt.problem.laws.law import Kinks, Law, Projected
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactopt.problem.laws import Law, Projected
+from contactopt.problem.laws.law import Law, Projected
 
 
 @dataclass(frozen=True, eq=False)

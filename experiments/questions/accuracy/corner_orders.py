@@ -12,8 +12,8 @@ from scipy.interpolate import RegularGridInterpolator
 
 from contactopt import Material, Part, Plate, Scene, Support, reduce_bodies, solve
 from contactopt.analytic import corner
-from contactopt.interface.recovery import recover
-from contactopt.scenes.meshes import patch, rename, tensor_mesh
+from contactopt.coupling.back_to_bodies import recover
+from contactopt.meshes.structured import patch, rename, tensor_mesh
 
 MATERIAL = Material(5.0, 0.3)
 CASES = {"frictionless": (0.0, False, 0.0), "mu = .3": (0.3, False, 0.3), "bonded": (1e6, True, None)}

@@ -18,7 +18,7 @@ from contactopt.analytic import (
     hertz_point,
 )
 from contactopt.material import Material
-from contactopt.scenes.meshes import patch, rename, tensor_mesh
+from contactopt.meshes.structured import patch, rename, tensor_mesh
 from contactopt.scenes.scene import Part, Rigid, Scene, Support
 
 SLOPE, POWER, FAR = 2.8, 0.3, 100.0

@@ -11,12 +11,12 @@ import numpy as np
 
 from contactopt import scenes
 from contactopt.accuracy import refine
-from contactopt.analysis.quantities import value_of
-from contactopt.analysis.zone import solve_zone
 from contactopt.analytic import contact_modulus
-from contactopt.bodies.refinement import split_scene
 from contactopt.material import Material
+from contactopt.readings.quantities import value_of
+from contactopt.scenes.refined_scenes import split_scene
 from contactopt.scenes.scene import Rigid, Scene
+from contactopt.solving.zone import solve_zone
 from experiments.questions.accuracy.half_space import MATERIAL, flat, indenter
 from experiments.report import REPORTS
 

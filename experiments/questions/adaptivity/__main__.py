@@ -28,10 +28,10 @@ import numpy as np
 
 from contactopt import Material, Part, Plate, Scene, Support, analytic, load_mesh
 from contactopt.accuracy import refine
-from contactopt.analysis.limits import Limits
-from contactopt.analysis.quantities import peak_pressure
-from contactopt.analysis.solve_scene import solve_scene
+from contactopt.readings.quantities import peak_pressure
 from contactopt.scenes import make_scene
+from contactopt.solving.limits import Limits
+from contactopt.solving.solve_scene import solve_scene
 from experiments.questions.adaptivity.stress import hertz3d, locally, stress
 from experiments.report import REPORTS, write
 
@@ -77,14 +77,14 @@ def orders() -> list[dict[str, Any]]:
 
 def refine_value(solved: Any) -> float:
     """The elastic energy of a solved scene."""
-    from contactopt.analysis.quantities import elastic_energy
+    from contactopt.readings.quantities import elastic_energy
 
     return elastic_energy(solved.reduction, solved.solution)
 
 
 def _even(scene: Scene, count: int) -> Scene:
     """The scene of the punch on even meshes, `count` squares across the half-width everywhere."""
-    from contactopt.scenes.meshes import rename, tensor_mesh
+    from contactopt.meshes.structured import rename, tensor_mesh
 
     def even(part: Any) -> Any:
         low, high = (np.array(limit) for limit in zip(*((row.min(), row.max()) for row in part.build_mesh(4, None).p)))

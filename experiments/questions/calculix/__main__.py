@@ -18,9 +18,9 @@ from typing import Any  # noqa: E402
 import numpy as np  # noqa: E402
 
 from contactopt import solve  # noqa: E402
+from contactopt.coupling.back_to_bodies import recover  # noqa: E402
+from contactopt.coupling.reduction import reduce_bodies  # noqa: E402
 from contactopt.figures.style import BLUE, GREEN, ORANGE  # noqa: E402
-from contactopt.interface.recovery import recover  # noqa: E402
-from contactopt.interface.reduction import reduce_bodies  # noqa: E402
 from experiments.questions.calculix.deck import LEAST  # noqa: E402
 from experiments.questions.calculix.run import (  # noqa: E402
     MU,
@@ -101,8 +101,8 @@ def best_factor(sweep: list[dict[str, Any]], law: str) -> float:
 MEMORY = """
 import sys
 from contactopt import solve
-from contactopt.interface.recovery import recover
-from contactopt.interface.reduction import reduce_bodies
+from contactopt.coupling.back_to_bodies import recover
+from contactopt.coupling.reduction import reduce_bodies
 from experiments.questions.calculix.run import peak_memory, punch
 reduction = reduce_bodies(punch(int(sys.argv[1])))
 recover(reduction, solve(reduction.problem))

@@ -15,8 +15,8 @@ import numpy as np
 import skfem
 
 from contactopt import InterfaceProblem, Material, Scene, scenes, solve
-from contactopt.interface.recovery import recover
-from contactopt.interface.reduction import Reduction, reduce_bodies
+from contactopt.coupling.back_to_bodies import recover
+from contactopt.coupling.reduction import Reduction, reduce_bodies
 from experiments.questions.calculix.deck import Contact, Model, deck, model
 
 ELEMENTS, MU = 32, 0.2

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.integrate import dblquad
 
 from contactopt import HalfSpace, Material, follow, scenes, solve
-from contactopt.analysis.half_spaces import subsurface_stress, surface_contact
 from contactopt.analytic import contact_modulus, cycle_loss_point, tangential_modulus
 from contactopt.bodies.influence import half_space_influence
-from contactopt.interface.reduction import reduce_bodies
+from contactopt.coupling.reduction import reduce_bodies
+from contactopt.readings.half_space_readings import subsurface_stress, surface_contact
 from experiments.questions.half_spaces.measured import Row, cpu, solved
 
 PLACES = ((0, 0), (1, 0), (1, 1), (5, 3), (12, 12), (13, 4), (64, 64), (65, 10), (500, 300))  # in cells

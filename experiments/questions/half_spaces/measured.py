@@ -11,8 +11,8 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 from contactopt import Scene, Solution, solve
-from contactopt.analysis.half_spaces import surface_contact
-from contactopt.interface.reduction import Reduction, reduce_bodies
+from contactopt.coupling.reduction import Reduction, reduce_bodies
+from contactopt.readings.half_space_readings import surface_contact
 
 Row = dict[str, Any]
 
@@ -51,7 +51,7 @@ def solved(scene: Scene, tol: float = 1e-8) -> tuple[Row, Reduction, Solution]:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     making, reduction = cpu(lambda: reduce_bodies(scene))
     steps = Steps(reduction.problem.Q.kernel.grid)
-    log = logging.getLogger("contactopt.solving.methods.nested")
+    log = logging.getLogger("contactopt.methods.nested")
     log.addHandler(steps)
     log.setLevel(logging.INFO)
     solving, solution = cpu(lambda: solve(reduction.problem, tol=tol))

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from contactopt import HalfSpace, Material, Rigid, Scene, Solution, run, scenes, solve
 from contactopt.analytic import contact_modulus, hertz_line, hertz_point
+from contactopt.coupling.reduction import reduce_bodies
 from contactopt.figures.plots import BLUE, GREEN, GREY, ORANGE
-from contactopt.interface.reduction import reduce_bodies
 from experiments.questions.half_spaces.measured import Row, cpu
 
 MATERIAL = Material(5.0, 0.3)

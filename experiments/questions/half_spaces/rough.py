@@ -13,7 +13,7 @@ import numpy as np
 
 from contactopt import HalfSpace, Material, Rigid, Scene, natural_map_residual
 from contactopt.analytic import contact_modulus
-from contactopt.scenes.surfaces import self_affine
+from contactopt.scenes.rough_surfaces import self_affine
 from experiments.questions.half_spaces.measured import Row, apart, solved
 
 LENGTH, MATERIAL, MU = 10.0, Material(5.0, 0.3), 0.3

@@ -15,7 +15,7 @@ from experiments.questions.nonmatching import accuracy, beside, cost, exact  # n
 from experiments.report import merged, write  # noqa: E402
 
 TEXT = """How accurate is contact between meshes whose nodes do not match? contactopt chooses a mortar coupling with dual multipliers for them
-(`contactopt/interface/mortar.py`). In the tables `a:b` are the numbers of elements of the upper and of the lower body across the contact
+(`contactopt/coupling/mortar.py`). In the tables `a:b` are the numbers of elements of the upper and of the lower body across the contact
 half-width. The finer side carries the contacts, unless a column says otherwise.
 
 ## Exact to rounding

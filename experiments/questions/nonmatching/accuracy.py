@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from contactopt import reduce_bodies, scenes, solve
-from contactopt.analysis.paths import follow
-from contactopt.analysis.quantities import stick_width
+from contactopt.readings.quantities import stick_width
 from contactopt.scenes import round as round_bodies
 from contactopt.scenes.sliding import _sheared
+from contactopt.solving.paths import follow
 from experiments.questions.cattaneo import error
 from experiments.questions.nonmatching.bodies import apart, carried, press_fit, punch, stiff_punch
 

@@ -9,8 +9,8 @@ import numpy as np
 import skfem
 
 from contactopt import Contact, Material, Part, Plate, Scene, Support, scenes
+from contactopt.meshes.structured import rename, tensor_mesh
 from contactopt.scenes.common import with_elements
-from contactopt.scenes.meshes import rename, tensor_mesh
 
 MATERIAL = Material(5.0, 0.3)
 

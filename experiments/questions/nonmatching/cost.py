@@ -15,8 +15,8 @@ from contactopt import Scene, reduce_bodies, solve
 from contactopt.bodies import assemble
 from contactopt.bodies.solvers import make_solver
 from contactopt.bodies.solvers.system import System
-from contactopt.interface.coupling import couple
-from contactopt.interface.reduction import Reduction
+from contactopt.coupling.coupling import couple
+from contactopt.coupling.reduction import Reduction
 from experiments.questions.cost_ratio import timed
 from experiments.questions.nonmatching.bodies import apart, punch
 

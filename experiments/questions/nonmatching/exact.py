@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from contactopt import reduce, reduce_bodies, solve
-from contactopt.interface.reduction import Reduction
+from contactopt.coupling.reduction import Reduction
 from experiments.questions.nonmatching.bodies import apart, press_fit, punch, stacked
 
 AREA = {"plane-strain": 1.0, "axisymmetric": np.pi, "solid": 1.0}

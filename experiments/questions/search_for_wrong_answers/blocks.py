@@ -10,7 +10,7 @@ import numpy as np
 
 from contactopt import BodyForce, Contact, Material, Part, Plate, Rigid, Scene, Support, Traction
 from contactopt.analytic import contact_modulus
-from contactopt.scenes.meshes import simplices
+from contactopt.meshes.structured import simplices
 from experiments.questions.search_for_wrong_answers.compare import Case, Way
 from experiments.questions.search_for_wrong_answers.meshes import extruded, outlined, quads, random_move, ticks
 

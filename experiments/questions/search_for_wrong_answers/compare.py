@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from contactopt import HalfSpace, Rigid, Scene, run
-from contactopt.analysis.quantities import elastic_energy
-from contactopt.analysis.status import contact_status
+from contactopt.problem.contact_status import contact_status
+from contactopt.readings.quantities import elastic_energy
 from experiments.questions.search_for_wrong_answers.meshes import Move
 
 LEVELS = (0, 1, 2)  # each about twice as fine as the one before

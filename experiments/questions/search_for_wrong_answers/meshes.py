@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from contactopt import BodyForce, HalfSpace, Part, Plate, Rigid, Scene, load_mesh
-from contactopt.scenes.meshes import tensor_mesh
+from contactopt.meshes.structured import tensor_mesh
 
 Corner = tuple[
     float, float, float, str
@@ -60,7 +60,7 @@ def ring(radii: np.ndarray, angles: np.ndarray) -> Any:
 
 def extruded(mesh: Any, z: np.ndarray) -> Any:
     """Bricks over plane quadrilaterals, with their sides, and the ends `near` and `far`."""
-    from contactopt.scenes.discs import extrude
+    from contactopt.meshes.discs import extrude
 
     made = extrude(mesh.p, mesh.t, z)
     facets, n = made.boundary_facets(), mesh.p.shape[1]

@@ -11,8 +11,8 @@ from scipy.special import gamma
 
 from contactopt import Contact, HalfSpace, Part, Plate, Rigid, Scene, Support
 from contactopt.analytic import contact_modulus, hertz_line, hertz_point, press_fit
-from contactopt.scenes.discs import extrude, half_disc
-from contactopt.scenes.meshes import graded, tensor_mesh
+from contactopt.meshes.discs import extrude, half_disc
+from contactopt.meshes.structured import graded, tensor_mesh
 from contactopt.scenes.round import cylinder
 from experiments.questions.search_for_wrong_answers.blocks import Random, friction, material, oblique
 from experiments.questions.search_for_wrong_answers.compare import Case, Way

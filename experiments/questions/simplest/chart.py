@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 
 from contactopt import HalfSpace, Part, Rigid, Scene, Support, analytic, scenes
 from contactopt.accuracy import refine
-from contactopt.analysis.limits import Limits
-from contactopt.analysis.quantities import peak_pressure
-from contactopt.analysis.solve_scene import solve_scene
+from contactopt.meshes.structured import contact_grid, graded, rename, tensor_mesh
+from contactopt.readings.quantities import peak_pressure
 from contactopt.scenes.common import RUBBER
-from contactopt.scenes.meshes import contact_grid, graded, rename, tensor_mesh
 from contactopt.simplification.constants import WORST
 from contactopt.simplification.joints import coarse
 from contactopt.simplification.large_bodies import as_half_spaces, spot_of
+from contactopt.solving.limits import Limits
+from contactopt.solving.solve_scene import solve_scene
 
 Row = dict[str, Any]
 

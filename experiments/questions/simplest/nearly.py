@@ -13,13 +13,13 @@ from skfem import MeshQuad, MeshTri
 
 from contactopt import BodyForce, Contact, Material, Part, Plate, Rigid, Scene, Support, Traction, scenes, simplify
 from contactopt import natural_map_residual as certificate
-from contactopt.analysis.quantities import approach, elastic_energy
-from contactopt.analysis.solve_scene import Options, Solved, solve_scene
-from contactopt.interface.reduction import reduce_bodies
-from contactopt.scenes.meshes import rename, tensor_mesh
-from contactopt.scenes.polar import ring
+from contactopt.coupling.reduction import reduce_bodies
+from contactopt.meshes.polar import ring
+from contactopt.meshes.structured import rename, tensor_mesh
+from contactopt.readings.quantities import approach, elastic_energy
 from contactopt.simplification.proof import Spread
 from contactopt.simplification.search import proved_part
+from contactopt.solving.solve_scene import Options, Solved, solve_scene
 
 Row = dict[str, Any]
 SOFT, STIFF = Material(5.0, 0.3), Material(20.0, 0.2)

@@ -1,1 +1,0 @@
-"""What is asked of scenes: solving them, finding their contact zones, reading quantities, following load paths."""

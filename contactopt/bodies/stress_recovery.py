@@ -1,0 +1,386 @@
+"""Recovered stress at chosen places: a linear map of the displacement, more accurate than the stress inside the elements.
+
+Around a place x the stresses s_h of the elements near it are fitted by a polynomial P a of the degree of the displacement,
+
+    a = argmin sum_q |s_h(x_q) - P(x_q - x) a|^2,      s*(x) = P(0) a = sum_q c_q s_h(x_q),
+
+with one coefficient vector a per component. The points x_q are those at which the stress of an element is most accurate: its
+centre where the displacement is linear, the Gauss points of order two where it is quadratic. The patch of a vertex is made of
+the elements around it; that of a vertex on the boundary also of the elements around its neighbours, since there the fit looks
+from one side. The patch of another point is made of the elements around the vertices of the element that holds it. A patch at a
+plane of symmetry holds the mirror images of its elements, too: the shear across the plane, which changes its sign there, is
+zero, and the other components are fitted from both sides.
+
+The element stress is linear in the displacement, s_h = D U, and the coefficients c depend on the mesh alone: s* = R D U. So a
+function f of the recovered stress has the derivative D' R' df/ds* by U. The load of its adjoint problem is the transpose of
+the recovery.
+
+Source: Zienkiewicz, Zhu (1992), The superconvergent patch recovery and a posteriori error estimates, Int. J. Numer. Methods
+Eng. 33.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations_with_replacement
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import skfem
+from skfem.quadrature import get_quadrature
+
+from contactopt.bodies.body import Assembly
+from contactopt.bodies.fields import PLACES
+from contactopt.bodies.protocol import Region
+from contactopt.errors import InputError
+from contactopt.material import lame, lame_by_poisson
+from contactopt.meshes.cells import straight
+from contactopt.meshes.local_refinement import simplices
+
+OUTSIDE = (
+    0.2  # how far beyond an element a point may lie, over its size, as an arc lies beyond the edge of a coarse mesh
+)
+POINTS = 1.5  # least number of points in a patch, over the number of coefficients
+
+
+@dataclass(frozen=True, eq=False)
+class StressMap:
+    """The recovered stress at m places of a body as a linear map of its displacement, as in the head of this module.
+
+    places   (dim, m) [length]
+    sources  (m,) vertices of the mesh, -1 for a place that is none
+    fit      of the stresses of the elements around each place
+    used     numbers of the elements whose stresses are fitted
+    even     (m, 4 or 6) 0 for the shear across a plane of symmetry at a place in it, else 1
+    body, basis, constants  of the element stress: the quadrature points, and the constants lambda and mu of the material
+    """
+
+    places: np.ndarray
+    sources: np.ndarray
+    fit: PatchFit
+    used: np.ndarray
+    even: np.ndarray
+    body: Assembly
+    basis: skfem.CellBasis
+    constants: tuple[float, float]
+
+    @property
+    def mesh(self) -> skfem.Mesh:
+        """The mesh of the body."""
+        return self.body.basis.mesh
+
+    def stress(self, U: np.ndarray) -> np.ndarray:
+        """Recover the stress.
+
+        Parameters
+        ----------
+        U : (n,)
+            The displacement of the body [length].
+
+        Returns
+        -------
+        (m, 4 or 6) array
+            The stress at every place, components as in contactopt.bodies.fields.STRESSES.
+        """
+        return np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1) * self.even
+
+    def deviation(self, U: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        """Estimate how uncertain a function of the recovered stress is.
+
+        The stresses of the elements around a place scatter about the fit, and what is fitted is as uncertain as that.
+
+        Parameters
+        ----------
+        U : (n,)
+            The displacement of the body [length].
+        slopes : (m, 4 or 6)
+            Derivatives of the function by the recovered stress.
+
+        Returns
+        -------
+        (m,) array
+            Its standard error at every place.
+        """
+        columns = zip(self._element_stress, (slopes * self.even).T)
+        return np.asarray(np.sqrt(sum((slope * self.fit.deviation(rows @ U)) ** 2 for rows, slope in columns)))
+
+    def elements(self, places: np.ndarray) -> np.ndarray:
+        """List the elements around some of the places.
+
+        Parameters
+        ----------
+        places
+            Numbers of places.
+
+        Returns
+        -------
+        ndarray
+            Numbers of elements.
+        """
+        chosen = np.isin(self.fit.row, places)
+        return np.asarray(self.used[np.unique(self.fit.column[chosen] // len(self.basis.W))])
+
+    def transposed(self, slopes: np.ndarray) -> np.ndarray:
+        """Apply the transpose of the map.
+
+        Parameters
+        ----------
+        slopes : (m, 4 or 6)
+            Derivatives of a function by the recovered stress.
+
+        Returns
+        -------
+        (n,) array
+            Its derivative by the displacement U.
+        """
+        columns = zip(self._element_stress, (slopes * self.even).T)
+        return np.asarray(sum(rows.T @ (self.weights.T @ slope) for rows, slope in columns))
+
+    def size(self, number: int) -> float:
+        """Measure the elements in the patch of a place.
+
+        Parameters
+        ----------
+        number
+            Number of the place.
+
+        Returns
+        -------
+        float
+            Their mean size [length].
+        """
+        own = np.unique(self.weights[number].indices // len(self.basis.W))
+        volume = np.asarray(self.basis.dx)[own].sum(axis=1)
+        return float(np.mean(volume) ** (1 / len(self.places)))
+
+    @cached_property
+    def weights(self) -> sp.csr_matrix:
+        """R (m, points): what the stresses of the elements contribute to each place."""
+        shape = (len(self.sources), self.basis.nelems * len(self.basis.W))
+        return sp.csr_matrix((self.fit.weights, (self.fit.row, self.fit.column)), shape)
+
+    @cached_property
+    def _element_stress(self) -> tuple[sp.csr_matrix, ...]:
+        """D, one matrix (points, n) per component."""
+        lam, shear = self.constants
+        basis, dofs = self.basis, self.basis.element_dofs
+        shape = (basis.nelems * len(basis.W), self.body.basis.N)
+        radius = np.asarray(basis.global_coordinates())[0] if self.body.weight[1] else None
+        places = PLACES[len(self.body.unknowns)]
+        entries: list[list[np.ndarray]] = [[] for _ in places]
+        for number in range(basis.Nbfun):
+            field = basis.basis[number][0]
+            gradient = np.asarray(field.grad)
+            strain = np.zeros((3, 3, *gradient.shape[2:]))
+            strain[: len(gradient), : len(gradient)] = (gradient + gradient.swapaxes(0, 1)) / 2
+            if radius is not None:
+                strain[2, 2] = np.asarray(field)[0] / radius
+            trace = np.trace(strain)
+            for own, (i, j) in zip(entries, places):
+                own.append(2 * shear * strain[i, j] + (lam * trace if i == j else 0.0))
+        row = np.tile(np.arange(shape[0]), basis.Nbfun)
+        column = np.repeat(dofs[:, :, None], len(basis.W), axis=2).ravel()
+        return tuple(sp.csr_matrix((np.stack(own).ravel(), (row, column)), shape) for own in entries)
+
+
+def stress_map(body: Assembly, region: Region, by_poisson: bool = False) -> StressMap:
+    """The recovered stress in a region of a body.
+
+    Parameters
+    ----------
+    body : assembled, of finite elements
+    region : where. The places are the vertices of the mesh there; a point is a place by itself
+    by_poisson : the derivative of the recovered stress by Poisson's ratio instead
+
+    Raises
+    ------
+    InputError : for a boundary that the body does not have, and for a point outside the body
+    """
+    mesh = straight(body.basis.mesh)
+    places, sources, seeds = _places(body.name, mesh, region)
+    terms = _terms(len(mesh.p), body.degree)
+    reference = get_quadrature(body.basis.mesh.refdom, 2 if body.degree == 2 else 1)
+    in_plane = body.mirrored[:, sources] & (sources >= 0)
+    patches = _patches(mesh, seeds, sources, body.mirrored, POINTS * len(terms) / len(reference[1]))
+    used = np.unique(patches.indices)
+    basis = skfem.Basis(body.basis.mesh, body.basis.elem, elements=used, quadrature=reference)
+    row = np.repeat(np.arange(len(sources)), np.diff(patches.indptr))
+    count = basis.X.shape[-1]
+    points = (np.searchsorted(used, patches.indices)[:, None] * count + np.arange(count)).ravel()
+    row = np.repeat(row, count)
+    at = np.asarray(basis.global_coordinates()).reshape(len(mesh.p), -1)
+    fit = _fit(*_both_sides(at[:, points] - places[:, row], row, points, in_plane), len(sources), terms)
+    constants = lame_by_poisson(body.material) if by_poisson else lame(body.material)
+    mirrored = np.concatenate([in_plane, np.zeros((3 - len(in_plane), len(sources)), dtype=bool)])
+    even = np.stack([~(mirrored[i] ^ mirrored[j]) for i, j in PLACES[len(mesh.p)]], axis=1).astype(float)
+    return StressMap(places, sources, fit, used, even, body, basis, constants)
+
+
+def _both_sides(
+    offset: np.ndarray, row: np.ndarray, column: np.ndarray, in_plane: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points of patches with their mirror images across the planes (dim, m) in which their places lie."""
+    for axis, there in enumerate(in_plane):
+        images = np.flatnonzero(there[row])
+        other = offset[:, images].copy()
+        other[axis] *= -1
+        offset = np.concatenate([offset, other], axis=1)
+        row, column = np.concatenate([row, row[images]]), np.concatenate([column, column[images]])
+    return offset, row, column
+
+
+def _places(name: str, mesh: Any, region: Region) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+    """Places (dim, m), the vertices there or -1 (m,), and the vertices (m, vertices) whose elements make each patch."""
+    count = mesh.p.shape[1]
+    vertices, point = np.unique(mesh.t), np.asarray(region.point, dtype=float)
+    if region.boundary:
+        known = mesh.boundaries or {}
+        if region.boundary not in known:
+            raise InputError(
+                f"body '{name}' has no boundary {region.boundary!r}; it has {', '.join(sorted(known)) or 'none'}."
+            )
+        vertices = np.unique(mesh.facets[:, known[region.boundary]])
+    elif region.radius is not None:
+        vertices = vertices[np.linalg.norm(mesh.p[:, vertices] - point[:, None], axis=0) <= region.radius]
+    elif len(point):
+        vertices = vertices[:0]
+    seeds = sp.csr_matrix((np.ones(len(vertices)), (np.arange(len(vertices)), vertices)), (len(vertices), count))
+    places = mesh.p[:, vertices]
+    if len(point):
+        corners, beyond = _holder(mesh, point)
+        if beyond <= OUTSIDE:
+            own = sp.csr_matrix((np.ones(len(corners)), (np.zeros(len(corners), int), corners)), (1, count))
+            seeds, places = sp.vstack([seeds, own]).tocsr(), np.column_stack([places, point])
+            vertices = np.append(vertices, -1)
+        elif not len(vertices):
+            place = ", ".join(f"{x:g}" for x in point)
+            raise InputError(f"the point ({place}) lies outside body '{name}'; give one inside it or on its surface.")
+    return places, vertices, seeds
+
+
+def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
+    """The corners of the simplex that holds a point, or comes nearest to it, and by how much of its size it misses the point."""
+    cells = simplices(mesh)
+    origin = cells.p[:, cells.t[0]]
+    edges = cells.p[:, cells.t[1:]] - origin[:, None]
+    shares = np.linalg.solve(np.moveaxis(edges, 2, 0), (point[:, None] - origin).T[..., None])[..., 0]
+    beyond = -np.minimum(shares.min(axis=1), 1 - shares.sum(axis=1))
+    best = int(np.argmin(beyond))
+    return cells.t[:, best], float(beyond[best])
+
+
+def _patches(mesh: Any, seeds: sp.csr_matrix, sources: np.ndarray, mirrored: np.ndarray, least: float) -> sp.csr_matrix:
+    """Mask (m, elements) of the elements that make each patch.
+
+    With their mirror images beyond the planes of symmetry of `mirrored` (dim, nodes) they are at least `least` where the mesh
+    has them.
+    """
+    count = mesh.t.shape[1]
+    around = sp.csr_matrix(
+        (np.ones(mesh.t.size), (mesh.t.ravel(), np.tile(np.arange(count), len(mesh.t)))), (mesh.p.shape[1], count)
+    )
+    patches = seeds @ around
+    rim = mesh.facets[:, mesh.boundary_facets()]
+    rim = np.unique(rim[:, ~np.any(np.all(mirrored[:, rim], axis=1), axis=0)])
+    images = 2.0 ** np.where(sources >= 0, mirrored[:, sources].sum(axis=0), 0)
+    small = np.isin(sources, rim) | (images * np.diff(patches.indptr) < least)
+    for _ in range(3):
+        if not small.any():
+            break
+        wider = patches[small] @ around.T @ around
+        patches = _replaced(patches, small, wider)
+        small = images * np.diff(patches.indptr) < min(least, count)
+    return patches
+
+
+def _replaced(rows: sp.csr_matrix, chosen: np.ndarray, others: sp.csr_matrix) -> sp.csr_matrix:
+    """The matrix with the chosen rows replaced."""
+    stacked = sp.vstack([rows, others]).tocsr()
+    order = np.arange(rows.shape[0])
+    order[chosen] = rows.shape[0] + np.arange(others.shape[0])
+    return stacked[order]
+
+
+def _terms(dim: int, degree: int) -> list[tuple[int, ...]]:
+    """The monomials up to a degree as tuples of axes, the constant first."""
+    return [axes for order in range(degree + 1) for axes in combinations_with_replacement(range(dim), order)]
+
+
+@dataclass(frozen=True, eq=False)
+class PatchFit:
+    """The least-squares fits around m places.
+
+    row      (p,) the place to which each point of a patch belongs;   column  (p,) its number among all points
+    powers   (p, t) monomials of the offsets;   inverse  (m, t, t) inverse of their moments
+    """
+
+    row: np.ndarray
+    column: np.ndarray
+    powers: np.ndarray
+    inverse: np.ndarray
+
+    @property
+    def weights(self) -> np.ndarray:
+        """(p,) what the value at each point contributes to the fit at its place."""
+        return np.asarray(np.sum(self.inverse[self.row, 0] * self.powers, axis=1))
+
+    def deviation(self, values: np.ndarray) -> np.ndarray:
+        """Standard error (m,) of the fit of values (points,) at the places, from what the fit leaves."""
+        count, own = len(self.inverse), values[self.column]
+        sums = [np.bincount(self.row, own * power, count) for power in self.powers.T]
+        coefficients = np.einsum("mab,bm->ma", self.inverse, np.array(sums))
+        left = own - np.sum(coefficients[self.row] * self.powers, axis=1)
+        free = np.maximum(np.bincount(self.row, minlength=count) - self.powers.shape[1], 1)
+        variance = np.bincount(self.row, left**2, count) / free
+        return np.asarray(np.sqrt(np.maximum(self.inverse[:, 0, 0], 0.0) * variance))
+
+
+def _fit(offset: np.ndarray, row: np.ndarray, column: np.ndarray, count: int, terms: list[tuple[int, ...]]) -> PatchFit:
+    """The fits of points at `offset` (dim, p) from the places to which `row` says they belong."""
+    size = np.zeros(count)
+    np.maximum.at(size, row, np.linalg.norm(offset, axis=0))
+    scaled = offset / size[row]
+    powers = np.stack([np.prod(scaled[list(axes)], axis=0) for axes in terms])
+    moments = np.zeros((count, len(terms), len(terms)))
+    for i, first in enumerate(powers):
+        for j, second in enumerate(powers[: i + 1]):
+            moments[:, i, j] = moments[:, j, i] = np.bincount(row, first * second, count)
+    return PatchFit(row, column, powers.T, np.linalg.pinv(moments, rcond=1e-10, hermitian=True))
+
+
+def von_mises(stress: np.ndarray) -> np.ndarray:
+    """Compute the von Mises stress.
+
+    Parameters
+    ----------
+    stress : (m, 4 or 6)
+        Stresses, whose first three columns are the normal ones.
+
+    Returns
+    -------
+    (m,) array
+        Their von Mises stress, in the unit of the stresses.
+    """
+    normal, shear = stress[:, :3], stress[:, 3:]
+    deviator = normal - normal.mean(axis=1, keepdims=True)
+    return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=1) + 3 * np.sum(shear**2, axis=1)))
+
+
+def von_mises_slopes(stress: np.ndarray) -> np.ndarray:
+    """Differentiate the von Mises stress.
+
+    Parameters
+    ----------
+    stress : (m, 4 or 6)
+        Stresses, whose first three columns are the normal ones.
+
+    Returns
+    -------
+    (m, 4 or 6) array
+        Derivatives by the components; 0 where there is no stress.
+    """
+    normal, size = stress[:, :3], von_mises(stress)[:, None]
+    slopes = np.concatenate([1.5 * (normal - normal.mean(axis=1, keepdims=True)), 3 * stress[:, 3:]], axis=1)
+    return np.divide(slopes, size, out=np.zeros(slopes.shape), where=size > 0)

@@ -1,0 +1,77 @@
+"""The one place where threads share work: bodies beside each other, and the pieces of one large product."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from contactopt.linear.threads import cores
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def each(
+    act: Callable[[Item], Result], items: Iterable[Item], parallel: Sequence[bool] | None = None
+) -> tuple[Result, ...]:
+    """Apply a function to every item, some of them at the same time.
+
+    The threads end with the call. An exception of one item is raised here.
+
+    Parameters
+    ----------
+    act
+        The function of an item.
+    items
+        The items.
+    parallel
+        A mark for every item: those marked are worked on at the same time, each in its own thread. By default all are.
+
+    Returns
+    -------
+    tuple
+        What the function returned, in the order of the items.
+    """
+    listed = list(items)
+    marked = [True] * len(listed) if parallel is None else list(parallel)
+    if sum(marked) < 2:
+        return tuple(act(item) for item in listed)
+    with ThreadPoolExecutor(sum(marked)) as pool:
+        running = [pool.submit(act, item) if mark else None for item, mark in zip(listed, marked)]
+        here = [act(item) if future is None else None for item, future in zip(listed, running)]
+        return tuple(done if future is None else future.result() for future, done in zip(running, here))  # type: ignore[misc]
+
+
+class Crew:
+    """Threads that help with pieces of one caller's work, one for each core but the caller's own. They sleep in between.
+
+    The threads start with the first piece and end with the object. A forked process makes its own.
+    """
+
+    def __init__(self, size: int | None = None):
+        self.size = cores() if size is None else size
+        self._pool: ThreadPoolExecutor | None = None
+        self._process = os.getpid()
+
+    def each(self, acts: Sequence[Callable[[], None]]) -> None:
+        """Do all of them, in any order. Whoever is free takes the next one, so that a busy machine costs no waiting."""
+        waiting = deque(acts)
+
+        def work() -> None:
+            while waiting:
+                try:
+                    act = waiting.popleft()
+                except IndexError:  # another thread took the last one
+                    return
+                act()
+
+        if self._pool is None or self._process != os.getpid():
+            self._process, self._pool = os.getpid(), ThreadPoolExecutor(max(self.size - 1, 1), "crew")
+        helping = [self._pool.submit(work) for _ in range(min(self.size, len(acts)) - 1)]
+        work()
+        for future in helping:
+            if not future.cancel():
+                future.result()

@@ -1,0 +1,323 @@
+"""Interface operators that are convolutions over a regular grid of contacts, with products by fast Fourier transforms.
+
+The displacement of a contact then depends on the forces through the distances between contacts alone, as on a half-space:
+
+    u_a(x) = sum_b sum_y K_ab(x - y) r_b(y),        a, b the components n, t1[, t2],
+
+where t1 lies along the first axis of the grid and t2 along the second. K_ab is even in the distance along an axis, or odd if
+exactly one of a and b lies along it. On a grid that does not repeat itself the forces are padded by zeros to at least twice
+its size. Only the Fourier transforms of K are kept: real numbers times 1 or i, M0 (M1 / 2 + 1) of them for each pair (a, b).
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from contactopt.linear.counter import Counter
+from contactopt.linear.operators import InterfaceOperator, check_dense
+from contactopt.linear.threads import cores
+
+SINGLE = 2e-6  # accuracy of products from which on single precision serves
+LEVELS = 4  # halvings of the grid that its padding allows for
+LARGE = 2**16  # points from which on transforms use all processors
+Symbols = dict[tuple[int, int], np.ndarray]  # (a, b) with a <= b -> real array
+
+
+def embedding(grid: tuple[int, ...]) -> tuple[int, ...]:
+    """Choose the size of the padded grid on which a convolution is transformed.
+
+    Each of its sizes is twice a number that is at least that of the contacts and easy to halve and to transform.
+
+    Parameters
+    ----------
+    grid
+        Number of contacts along each of the one or two axes.
+
+    Returns
+    -------
+    tuple
+        Number of points M along each axis.
+    """
+    from scipy.fft import next_fast_len
+
+    return tuple(2 ** (LEVELS + 1) * int(next_fast_len(-(-n // 2**LEVELS), real=True)) for n in grid)
+
+
+def _odd_axes(a: int, b: int, axes: int) -> tuple[bool, ...]:
+    """Along which axes of the grid K_ab is odd."""
+    return tuple((a == c + 1) != (b == c + 1) for c in range(axes))
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """The kernel K of a convolution by its Fourier transform.
+
+    grid      number of contacts along each axis of the grid; contacts are numbered as in C arrays of that shape
+    padded    number of points along each axis of the transform; the grid's own where it repeats itself periodically
+    symbols   for each pair of components (a, b), a <= b, the transform (M0, M1 / 2 + 1) over 1 or, where K_ab is odd along one
+              axis, over i [length / force]; pairs that are left out are zero
+    """
+
+    grid: tuple[int, ...]
+    padded: tuple[int, ...]
+    symbols: Symbols
+
+    @classmethod
+    def of_coefficients(cls, grid: tuple[int, ...], coefficients: Symbols) -> Kernel:
+        """Make a kernel from its coefficients.
+
+        Parameters
+        ----------
+        grid
+            Number of contacts along each axis.
+        coefficients
+            For each pair of components (a, b) with a <= b the coefficients K_ab at distances 0 to M / 2 along each
+            axis, with M as `embedding` gives it [length / force].
+
+        Returns
+        -------
+        Kernel
+            The kernel.
+        """
+        from scipy.fft import rfftn
+
+        padded, symbols = embedding(grid), {}
+        for (a, b), part in coefficients.items():
+            odd, whole = _odd_axes(a, b, len(grid)), part
+            for axis, size in enumerate(padded):
+                mirrored = np.flip(np.delete(whole, [0, size // 2], axis), axis)
+                if odd[axis]:
+                    middle = np.moveaxis(whole, axis, 0).copy()
+                    middle[[0, -1]] = 0.0
+                    whole, mirrored = np.moveaxis(middle, 0, axis), -mirrored
+                whole = np.concatenate([whole, mirrored], axis)
+            transform = rfftn(whole)
+            symbols[a, b] = np.ascontiguousarray(transform.imag if sum(odd) == 1 else transform.real)
+        return cls(grid, padded, symbols)
+
+    @property
+    def dim(self) -> int:
+        return len(self.grid) + 1
+
+    def __add__(self, other: Kernel) -> Kernel:
+        """The sum of two kernels on the same grid; pairs of components that cancel but for rounding are left out."""
+        symbols = dict(self.symbols)
+        for pair, symbol in other.symbols.items():
+            symbols[pair] = symbols[pair] + symbol if pair in symbols else symbol
+        largest = max(float(np.abs(symbol).max()) for symbol in (*self.symbols.values(), *other.symbols.values()))
+        kept = {pair: symbol for pair, symbol in symbols.items() if np.abs(symbol).max() > 1e-14 * largest}
+        return Kernel(self.grid, self.padded, kept)
+
+    def scaled(self, factor: float) -> Kernel:
+        return Kernel(self.grid, self.padded, {pair: factor * symbol for pair, symbol in self.symbols.items()})
+
+    @cached_property
+    def diagonal(self) -> np.ndarray:
+        """(dim,) of the operator: K_aa(0), the mean of the transform."""
+        size = self.padded[-1]
+        twice = np.full(size // 2 + 1, 2.0)
+        twice[[0, size // 2]] = 1.0
+        if size % 2:
+            twice[-1] = 2.0
+        means = [(self.symbols[a, a] @ twice).sum() / np.prod(self.padded) for a in range(self.dim)]
+        return np.array(means)
+
+    @cached_property
+    def single(self) -> Symbols:
+        """The symbols in single precision."""
+        return {pair: symbol.astype(np.float32) for pair, symbol in self.symbols.items()}
+
+    @property
+    def halves(self) -> bool:
+        """Whether there is a grid of half as many contacts along each axis for which `coarse` works."""
+        doubled = all(m % 4 == 0 and m >= 2 * n for m, n in zip(self.padded, self.grid))
+        periodic = all(m == n and n % 4 == 0 for m, n in zip(self.padded, self.grid))
+        return doubled or periodic
+
+    def coarse(self) -> Kernel:
+        """Make the kernel between pairs (in 2D) or squares of four contacts.
+
+        A force is spread evenly over them, and displacements are means. Along each axis
+        K_c(I) = (K(2 I - 1) + 2 K(2 I) + K(2 I + 1)) / 4, which is a product with cos^2 followed by the sum over
+        the two frequencies that fall on one.
+
+        Returns
+        -------
+        Kernel
+            The kernel on the grid of half as many contacts along each axis.
+        """
+        symbols = {}
+        for pair, symbol in self.symbols.items():
+            odd = _odd_axes(*pair, len(self.grid))
+            for axis, size in enumerate(self.padded):
+                final = axis == len(self.padded) - 1
+                count = size // 2 + 1 if final else size
+                shape = [count if i == axis else 1 for i in range(symbol.ndim)]
+                weighted = symbol * (np.cos(np.pi * np.arange(count) / size) ** 2).reshape(shape)
+                low = np.take(weighted, range(size // 4 + 1 if final else size // 2), axis)
+                if final:  # the frequency k + M / 2 is minus the frequency M / 2 - k
+                    high = np.take(weighted, range(size // 2, size // 4 - 1, -1), axis)
+                    high = _negated(high, axis, odd)
+                else:
+                    high = np.take(weighted, range(size // 2, size), axis)
+                symbol = (low + high) / 2
+            symbols[pair] = np.ascontiguousarray(symbol)
+        halved = tuple(m // 2 for m in self.padded)
+        return Kernel(tuple(-(-n // 2) for n in self.grid), halved, symbols)
+
+    def act(self, x: np.ndarray, rows: tuple[int, ...], columns: tuple[int, ...], single: bool = False) -> np.ndarray:
+        """Compute displacements under forces.
+
+        Parameters
+        ----------
+        x
+            (columns, n0[, n1]) forces on the grid [force].
+        rows, columns
+            The components of the displacements and of the forces.
+        single
+            Whether single precision is enough.
+
+        Returns
+        -------
+        ndarray
+            (rows, n0[, n1]) displacements [length].
+        """
+        symbols = self.single if single else self.symbols
+        spectra = {}
+        for b, part in zip(columns, x):
+            if np.any(part):
+                spectra[b] = forward(part.astype(np.float32 if single else np.float64, copy=False), self.padded)
+        out = np.zeros((len(rows), *self.grid), np.float32 if single else np.float64)
+        for place, a in enumerate(rows):
+            total: Any = None
+            for b, spectrum in spectra.items():
+                pair = (min(a, b), max(a, b))
+                if pair not in symbols:
+                    continue
+                term = symbols[pair] * spectrum
+                if sum(_odd_axes(a, b, len(self.grid))) == 1:
+                    term *= np.array(1j if a < b else -1j, term.dtype)
+                total = term if total is None else np.add(total, term, out=total)
+            if total is not None:
+                out[place] = backward(total, self.padded, self.grid)
+        return out
+
+    def entries(self) -> np.ndarray:
+        """Write the operator as an array.
+
+        Returns
+        -------
+        ndarray
+            (k dim, k dim) [length / force].
+
+        Raises
+        ------
+        InputError
+            If it would be too large.
+        """
+        k, dim = int(np.prod(self.grid)), self.dim
+        check_dense(k * dim)
+        places = np.indices(self.grid).reshape(len(self.grid), k)
+        apart = places[:, :, None] - places[:, None, :]
+        Q = np.zeros((k, dim, k, dim))
+        for (a, b), symbol in self.symbols.items():
+            factor = 1j if sum(_odd_axes(a, b, len(self.grid))) == 1 else 1.0
+            values = backward(factor * symbol, self.padded, self.padded)[tuple(apart)]
+            Q[:, a, :, b] = values
+            Q[:, b, :, a] = values.T
+        return Q.reshape(k * dim, k * dim)
+
+
+def _negated(high: np.ndarray, axis: int, odd: tuple[bool, ...]) -> np.ndarray:
+    """The symbol at the frequency -k along an axis, from that at k."""
+    return -high if odd[axis] else high
+
+
+def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
+    """Transform values on a grid, padded by zeros. Rows that hold nothing but padding are skipped.
+
+    Parameters
+    ----------
+    x
+        (n0[, n1]) real values, in single or double precision.
+    padded
+        Sizes (M0[, M1]) of the padded grid.
+
+    Returns
+    -------
+    ndarray
+        The transform, (M0 / 2 + 1,) in 2D and (M0, M1 / 2 + 1) in 3D, in the precision of x.
+    """
+    from scipy.fft import fft, rfft
+
+    workers = _workers_for(padded)
+    spectrum = rfft(x, n=padded[-1], axis=-1, workers=workers)
+    if len(padded) == 2:
+        spectrum = fft(spectrum, n=padded[0], axis=0, overwrite_x=True, workers=workers)
+    return np.asarray(spectrum)
+
+
+def backward(spectrum: np.ndarray, padded: tuple[int, ...], grid: tuple[int, ...]) -> np.ndarray:
+    """Transform back and keep the part of the grid.
+
+    Parameters
+    ----------
+    spectrum
+        The transform as `forward` gives it. It is overwritten.
+    padded
+        Sizes (M0[, M1]) of the padded grid.
+    grid
+        Number of contacts along each axis.
+
+    Returns
+    -------
+    ndarray
+        (n0[, n1]) real values.
+    """
+    from scipy.fft import ifft, irfft
+
+    workers = _workers_for(padded)
+    if len(padded) == 2:
+        spectrum = ifft(spectrum, axis=0, overwrite_x=True, workers=workers)[: grid[0]]
+    return np.asarray(irfft(spectrum, n=padded[-1], axis=-1, workers=workers))[..., : grid[-1]]
+
+
+def _workers_for(padded: tuple[int, ...]) -> int:
+    """Number of processors for transforms of that size; OMP_NUM_THREADS bounds it."""
+    if np.prod(padded) < LARGE:
+        return 1
+    available = cores()
+    asked = os.environ.get("OMP_NUM_THREADS", "")
+    return min(available, int(asked)) if asked.isdigit() and int(asked) > 0 else available
+
+
+class Convolution(InterfaceOperator):
+    """The interface operator of a kernel, in double precision, or in single precision where that is accurate enough."""
+
+    def __init__(self, kernel: Kernel, accuracy: float | None = None, counter: Counter | None = None):
+        self.kernel = kernel
+        diagonal = np.tile(kernel.diagonal, int(np.prod(kernel.grid)))
+        super().__init__(self._product, diagonal, kernel.entries, accuracy, counter=counter)
+
+    def _product(self, X: np.ndarray, accuracy: float | None) -> np.ndarray:
+        every = tuple(range(self.kernel.dim))
+        single = accuracy is not None and accuracy >= SINGLE
+        out = np.empty(X.shape)
+        for column in range(X.shape[1]):
+            parts = X[:, column].reshape(*self.kernel.grid, self.kernel.dim)
+            moved = self.kernel.act(np.moveaxis(parts, -1, 0), every, every, single)
+            out[:, column] = np.moveaxis(moved, 0, -1).ravel()
+        return out
+
+    def scaled(self, factor: float, added: np.ndarray, counter: Counter | None = None) -> InterfaceOperator:
+        if np.any(added):
+            return super().scaled(factor, added, counter)
+        return Convolution(self.kernel.scaled(factor), self.accuracy, counter)
+
+    def loosened(self, accuracy: float) -> InterfaceOperator:
+        return Convolution(self.kernel, accuracy, self.counter)

@@ -1,0 +1,422 @@
+"""The interface operator Q known by its products: what every method needs that never looks at an entry of Q.
+
+A product costs one solve per body; the entries of Q cost one per interface unknown. Methods that need them ask for
+`dense(Q)`. All functions here take the three forms of Q: an array, a scipy sparse matrix in compressed rows (csr_array),
+and an InterfaceOperator.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any, TypeAlias
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import LinearOperator
+
+from contactopt.errors import InputError
+from contactopt.linear.counter import Counter
+from contactopt.linear.saddle_point import CoupledForm
+
+log = logging.getLogger(__name__)
+
+FORMS = ("auto", "explicit", "implicit")  # of Q
+NOISE = 1e-13  # relative size of what rounding leaves of a zero
+FINEST = 1e-11  # accuracy of products that is not asked for more
+COLUMNS = 64  # unit vectors handed to the bodies at a time when the entries of Q are asked for
+NOTABLE_BYTES = 2**28  # bytes of an array Q from which on its size is logged: a quarter of a gigabyte
+MOST_BYTES = 8_000_000_000  # of an array Q; those who factorise it need another one or two of its size
+
+# (X (n,) or (n, j), relative accuracy or None for the best there is) -> the product with X, of its shape
+Product = Callable[[np.ndarray, float | None], np.ndarray]
+
+
+class InterfaceOperator(LinearOperator):
+    """Q (n, n), symmetric positive semidefinite, by its products [length / force].
+
+    product    x (n,) or (n, j), relative accuracy or None (the best there is) -> Q x
+    diagonal   (n,) diagonal of Q or an estimate of it, exactly 0 where a component cannot move
+    entries    () -> Q (n, n) where there is a cheaper way to it than n products
+    accuracy   relative, of the products; None: the best there is
+    inexact    whether a lower accuracy makes a product cheaper
+    coupled    the same Q before condensation, where the bodies are solved by iteration; None elsewhere
+    counter    counts the columns multiplied; by default one of its own. Operators made from another one share its counter
+    held       (n,) mask of the components that cannot move; by default those whose diagonal is 0
+    """
+
+    def __init__(
+        self,
+        product: Product,
+        diagonal: np.ndarray,
+        entries: Callable[[], np.ndarray] | None = None,
+        accuracy: float | None = None,
+        inexact: bool = False,
+        coupled: CoupledForm | None = None,
+        counter: Counter | None = None,
+        held: np.ndarray | None = None,
+    ):
+        super().__init__(np.dtype(float), (len(diagonal), len(diagonal)))
+        self.product, self.diagonal, self.entries = product, diagonal, entries
+        self.accuracy, self.inexact, self.coupled = accuracy, inexact, coupled
+        self.held = self.diagonal == 0 if held is None else held
+        self.counter = counter or Counter()
+
+    @property
+    def products(self) -> int:
+        """Number of columns multiplied so far."""
+        return self.counter.total
+
+    def _matmat(self, X: np.ndarray) -> np.ndarray:
+        self.counter.add(X.shape[1])
+        return np.asarray(self.product(X, self.accuracy))
+
+    def _matvec(self, x: np.ndarray) -> np.ndarray:
+        return self._matmat(x.reshape(-1, 1))[:, 0]
+
+    def _rmatvec(self, x: np.ndarray) -> np.ndarray:
+        return self._matvec(x)
+
+    def _adjoint(self) -> LinearOperator:
+        return self
+
+    def to_dense(self) -> np.ndarray:
+        """Write Q as an array. It takes n products unless there is a cheaper way.
+
+        Returns
+        -------
+        ndarray
+            (n, n), symmetric to the last digit [length / force].
+
+        Raises
+        ------
+        InputError
+            If it would be too large.
+        """
+        n = self.shape[0]
+        check_dense(n)
+        if self.entries is not None:
+            return self.entries()
+        Q = np.empty((n, n))
+        for first in range(0, n, COLUMNS):
+            unit = np.zeros((n, min(COLUMNS, n - first)))
+            unit[first + np.arange(unit.shape[1]), np.arange(unit.shape[1])] = 1.0
+            Q[:, first : first + unit.shape[1]] = self @ unit
+        return np.asarray((Q + Q.T) / 2)
+
+    def scaled(self, factor: float, added: np.ndarray, counter: Counter | None = None) -> InterfaceOperator:
+        """Make the operator factor Q + diag(added).
+
+        Parameters
+        ----------
+        factor
+            What Q is multiplied with.
+        added
+            (n,) what is added to its diagonal.
+        counter
+            Counts its products; by default one of its own.
+
+        Returns
+        -------
+        InterfaceOperator
+            The operator.
+        """
+
+        def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
+            return factor * self.product(X, accuracy) + added[:, None] * X
+
+        entries = self.entries
+        exact = None if entries is None else lambda: factor * entries() + np.diag(added)
+        coupled = None if self.coupled is None else self.coupled.scaled(factor, added)
+        diagonal = factor * self.diagonal + added
+        return InterfaceOperator(product, diagonal, exact, self.accuracy, self.inexact, coupled, counter, self.held)
+
+    def loosened(self, accuracy: float) -> InterfaceOperator:
+        """Make the same operator with less accurate products. Both count together.
+
+        Parameters
+        ----------
+        accuracy
+            Relative accuracy of a product that is good enough.
+
+        Returns
+        -------
+        InterfaceOperator
+            The operator.
+        """
+        return InterfaceOperator(
+            self.product, self.diagonal, self.entries, accuracy, self.inexact, self.coupled, self.counter, self.held
+        )
+
+    def block(self, unknowns: np.ndarray) -> InterfaceOperator:
+        """Take Q on some unknowns alone, e.g. its normal block (every dim-th) or an active set. Both count together.
+
+        Parameters
+        ----------
+        unknowns
+            (m,) their numbers.
+
+        Returns
+        -------
+        InterfaceOperator
+            The operator (m, m).
+        """
+        unknowns = np.asarray(unknowns)
+
+        def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
+            full = np.zeros((self.shape[0], X.shape[1]))
+            full[unknowns] = X
+            return self.product(full, accuracy)[unknowns]
+
+        entries = self.entries
+        exact = None if entries is None else lambda: entries()[np.ix_(unknowns, unknowns)]
+        diagonal, held = self.diagonal[unknowns], self.held[unknowns]
+        return InterfaceOperator(product, diagonal, exact, self.accuracy, self.inexact, None, self.counter, held)
+
+
+Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or InterfaceOperator
+
+
+def sparse(Q: object) -> sp.csr_array:
+    """Any scipy sparse matrix as compressed rows of floats, in memory of its own.
+
+    Parameters
+    ----------
+    Q
+        A scipy sparse matrix in any format.
+
+    Returns
+    -------
+    csr_array
+        With sorted columns, duplicates summed and zeros left out.
+    """
+    rows = sp.csr_array(Q, dtype=float, copy=True)
+    rows.sum_duplicates()
+    rows.eliminate_zeros()
+    return rows
+
+
+def check_dense(n: int) -> None:
+    """Before Q is formed as an array: log its size, as a warning from NOTABLE_BYTES on, and refuse it beyond
+    MOST_BYTES.
+
+    Parameters
+    ----------
+    n
+        Number of rows of Q.
+
+    Raises
+    ------
+    InputError
+        With the size in bytes, if the array would take more than MOST_BYTES.
+    """
+    size = 8 * n**2
+    if size > MOST_BYTES:
+        raise InputError(
+            f"Q as an array of {n} x {n} entries would take {size:,} bytes, more than {MOST_BYTES:,}; take Q = 'implicit' and a "
+            "method that uses products with Q, such as newton, or fewer elements."
+        )
+    level = logging.WARNING if size >= NOTABLE_BYTES else logging.INFO
+    log.log(level, "forming Q as an array of %d x %d entries: %s bytes", n, n, f"{size:,}")
+
+
+def dense(Q: Interface) -> np.ndarray:
+    """Q as an array.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+
+    Returns
+    -------
+    array (n, n)
+        Q itself if it is an array.
+
+    Raises
+    ------
+    InputError
+        If it would be larger than MOST_BYTES.
+    """
+    if isinstance(Q, InterfaceOperator):
+        return Q.to_dense()
+    if not sp.issparse(Q):
+        return Q
+    check_dense(Q.shape[0])
+    return np.asarray(Q.toarray())
+
+
+def diagonal(Q: Interface) -> np.ndarray:
+    """The diagonal of Q, or the estimate of it that an operator has.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+
+    Returns
+    -------
+    array (n,)
+        [length / force].
+    """
+    if isinstance(Q, InterfaceOperator):
+        return Q.diagonal
+    return np.asarray(Q.diagonal())
+
+
+def row_sizes(Q: np.ndarray | sp.csr_array) -> np.ndarray:
+    """The largest |Q_ij| of each row.
+
+    Parameters
+    ----------
+    Q
+        An array or sparse rows.
+
+    Returns
+    -------
+    array (n,)
+        [length / force].
+    """
+    if sp.issparse(Q):
+        return np.asarray(abs(Q).max(axis=1).toarray()).ravel() if Q.shape[0] else np.zeros(0)
+    return np.asarray(np.abs(Q).max(axis=1, initial=0.0))
+
+
+def asymmetry(Q: Interface) -> float:
+    """By how much Q misses to be symmetric:  max |Q - Q'| / max |Q|.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+
+    Returns
+    -------
+    float
+        0 for an operator, which is symmetric by definition.
+    """
+    if isinstance(Q, InterfaceOperator):
+        return 0.0
+    if sp.issparse(Q):
+        size = float(np.abs(Q.data).max(initial=0.0))
+        return float(np.abs((Q - Q.T).data).max(initial=0.0)) / size if size > 0 else 0.0
+    size = float(np.abs(Q).max(initial=0.0))
+    return float(np.abs(Q - Q.T).max(initial=0.0)) / size if size > 0 else 0.0
+
+
+def held(Q: Interface) -> np.ndarray:
+    """The components that cannot move, because they are coupled to no other component.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+
+    Returns
+    -------
+    array (n,) of bool
+        A mask.
+    """
+    if isinstance(Q, InterfaceOperator):
+        return Q.held
+    size = abs(Q)
+    coupling = np.asarray(size.sum(axis=1)).ravel() - size.diagonal()
+    return np.asarray(coupling <= NOISE * row_sizes(Q).max(initial=0.0))
+
+
+def shifted(Q: Interface, added: np.ndarray) -> Interface:
+    """Q + diag(added), of the same form as Q.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    added
+        (n,) what is added to the diagonal [length / force].
+
+    Returns
+    -------
+    array, sparse rows or InterfaceOperator
+        Products with it count with those of Q.
+    """
+    if sp.issparse(Q):
+        return sp.csr_array(Q + sp.diags_array(added))
+    if not isinstance(Q, InterfaceOperator):
+        return Q + np.diag(added)
+    return Q.scaled(1.0, added, Q.counter)
+
+
+def block(Q: Interface, unknowns: np.ndarray) -> Interface:
+    """Q on some unknowns alone, of the same form as Q.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    unknowns
+        (m,) their numbers.
+
+    Returns
+    -------
+    array, sparse rows or InterfaceOperator
+        (m, m); products with it count with those of Q.
+    """
+    if sp.issparse(Q):
+        return sp.csr_array(Q[unknowns][:, unknowns])
+    return Q.block(unknowns) if isinstance(Q, InterfaceOperator) else Q[np.ix_(unknowns, unknowns)]
+
+
+def loosened(Q: Interface, accuracy: float) -> Interface:
+    """Q with products that are no more accurate than asked, where this saves work.
+
+    Parameters
+    ----------
+    Q
+        Interface operator (n, n): an array, sparse rows or an InterfaceOperator.
+    accuracy
+        Relative error of a product that is good enough.
+
+    Returns
+    -------
+    array, sparse rows or InterfaceOperator
+        Q itself where a lower accuracy makes nothing cheaper.
+    """
+    accuracy = max(accuracy, FINEST)
+    return Q.loosened(accuracy) if isinstance(Q, InterfaceOperator) and Q.inexact else Q
+
+
+def estimate_diagonal(product: Product, weights: Sequence[np.ndarray], moves: np.ndarray) -> np.ndarray:
+    """The diagonal of Q from one product with a column for each pair of surfaces.
+
+    The trace on each pair of surfaces is estimated with random signs (Hutchinson 1989) and shared out by the weights. Each pair
+    has signs of its own: a thin body between two pairs moves one of them by forces on the other as far as by its own, and such
+    a share may be negative.
+
+    Parameters
+    ----------
+    product
+        The product with Q.
+    weights
+        (k_i,) nodal_weights() of each pair of surfaces, one pair after the other.
+    moves
+        (k dim,) mask of the components that can move.
+
+    Returns
+    -------
+    array (k dim,)
+        The estimate [length / force], 0 where a component cannot move.
+    """
+    dim = len(moves) // max(sum(len(own) for own in weights), 1)
+    ends = np.cumsum([0, *(dim * len(own) for own in weights)])
+    signs = np.where(np.random.default_rng(0).random(len(moves)) < 0.5, -1.0, 1.0) * moves
+    columns = np.zeros((len(moves), len(weights)))
+    for i, (first, stop) in enumerate(pairwise(ends)):
+        columns[first:stop, i] = signs[first:stop]
+    traces = np.einsum("ij,ij->j", columns, product(columns, 1e-2))
+    diagonal = np.zeros(len(moves))
+    for own, trace, (first, stop) in zip(weights, traces, pairwise(ends)):
+        shares = np.repeat(own**-2, dim) * moves[first:stop]
+        if shares.any():
+            diagonal[first:stop] = shares * (trace / shares.sum())
+    return diagonal

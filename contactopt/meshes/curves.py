@@ -1,0 +1,358 @@
+"""The smooth outline that a plane mesh stands for: straight pieces, arcs, and what is between them.
+
+The outline of a body is a chain of nodes. It is cut at corners; between them runs of nodes on one
+line are straight, runs on one circle are arcs, as far as the rounding of the coordinates allows to
+say. An edge that belongs to no run turns at its ends into the directions of the runs beside it, or
+of the circle through a node and its two neighbours. So straight pieces stay straight, and no edge
+feels what is beyond its neighbours.
+
+Every edge of length c carries the curve
+
+    y(s) = (1 - s/c) y_a(s) + s/c y_b(s)        over its chord, 0 <= s <= c,
+
+where y_a and y_b are arcs through both ends, with the curvatures k_a and k_b: an arc if these are
+the same. The blended arcs lie between the two and do not overshoot; neighbours have one tangent in
+common. Source: Wenz (1996), Interpolation of curve data by blended generalized circles, Computer
+Aided Geometric Design 13.
+
+Edges of second order are cut in halves at the nodes within them, which lie on the outline as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from contactopt.meshes.cells import is_curved
+from contactopt.meshes.given_curves import Curve
+
+# a polygon that turns by more between two edges has a corner there; three chords make a fillet
+CORNER = np.deg2rad(35)
+LARGEST = np.deg2rad(75)  # unless it is an arc that is tangent to the edges beside it, and turns by less
+ALIKE = 1e-3  # relative difference of their curvatures, and of angles [rad]
+KINK = (
+    np.deg2rad(5),
+    5.0,
+)  # a smaller turn is a corner if it is more than this, and times what its neighbours let expect
+# the middle of an edge is off the chord by more than this fraction of it, or the edge is straight
+STRAIGHT = 1e-9
+EXACT = 1e-9  # of the size of the body: coordinates are not compared more exactly
+DIGITS = range(6, 13)  # decimal digits that files write
+STEEP = np.sin(np.deg2rad(60))  # largest sine of the angle between an edge and its curve
+NEAREST = 8  # edges among which the nearest to a point is looked for first
+ARRAY = 1_000_000  # numbers in one array of distances
+
+
+def plane_curves(mesh: Any, arcs: bool) -> dict[str, Curve | None]:
+    """Find the curves of all boundaries of a plane mesh; those without a name have the name ''.
+
+    Parameters
+    ----------
+    mesh
+        A plane scikit-fem mesh.
+    arcs
+        Whether only arcs count as curved, where the mesh is a polygon.
+
+    Returns
+    -------
+    dict
+        By name the curve, or None where the boundary is straight.
+    """
+    facets = mesh.boundary_facets()
+    edges, points, owner, known = _edges(mesh, facets)
+    ends = np.zeros((2, edges.shape[1]))
+    near = rounding(points[:, np.unique(edges)])
+    for chain, numbers, forward in _chains(edges):
+        bends = _bends(points[:, chain], near, arcs and not known)
+        ends[:, numbers] = np.where(forward, bends, -bends[::-1])
+    found: dict[str, Curve | None] = {}
+    for name, label, mine in shares(mesh, owner):
+        curved = np.any(ends[:, mine] != 0)
+        found[name] = Curve(_Blends(points[:, edges[:, mine]], ends[:, mine]), known, label) if curved else None
+    return found
+
+
+def shares(mesh: Any, owner: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
+    """Divide pieces of the surface among the boundaries.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+    owner
+        (t,) the facet of each piece.
+
+    Yields
+    ------
+    tuple
+        The name of a boundary, or '' for what has no name; what messages call its curve; and
+        whether each piece is its own.
+    """
+    left = np.ones(len(owner), dtype=bool)
+    for name, facets in (mesh.boundaries or {}).items():
+        mine = np.isin(owner, facets)
+        left &= ~mine
+        yield name, f"the curve of boundary {name!r}", mine
+    yield "", "the curve of the boundary without a name", left
+
+
+def _edges(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+    """Edges (2, e) of the outline, places of nodes, the facet of each edge, and whether it curves."""
+    ends = mesh.facets[:, facets]
+    if not is_curved(mesh):
+        return ends, mesh.p, facets, False
+    middle, points = mesh.dofs.facet_dofs[0, facets], mesh.doflocs
+    off = np.linalg.norm(points[:, middle] - points[:, ends].mean(axis=1), axis=0)
+    if not np.any(off > STRAIGHT * np.linalg.norm(points[:, ends[1]] - points[:, ends[0]], axis=0)):
+        return ends, points, facets, False
+    halves = np.concatenate([[ends[0], middle], [middle, ends[1]]], axis=1)
+    return halves, points, np.tile(facets, 2), True
+
+
+def rounding(points: np.ndarray) -> float:
+    """Find how far nodes (dim, m) may be off because a file rounds its numbers [length]."""
+    size, largest = np.ptp(points, axis=1).max(), np.abs(points).max()
+    least = max(EXACT * size, 16 * np.finfo(float).eps * largest)
+    if np.array_equal(points, points.astype(np.float32)):
+        return float(max(least, 2.0**-22 * largest))
+    sample = points.ravel()[:: max(1, points.size // 200)]
+    for digits in DIGITS:
+        if all(float(f"{x:.{digits - 1}e}") == x for x in sample.tolist()):
+            return float(max(least, 2 * 10.0 ** (np.floor(np.log10(largest)) + 1 - digits)))
+    return float(least)
+
+
+def _chains(edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Edges (2, e) joined to chains: nodes, numbers of edges, and whether each runs forward.
+
+    A closed chain ends where it begins.
+    """
+    at: dict[int, list[int]] = {}
+    pairs = edges.T.tolist()
+    for number, pair in enumerate(pairs):
+        for node in pair:
+            at.setdefault(node, []).append(number)
+    left = set(range(len(pairs)))
+    starts = [node for node, numbers in at.items() if len(numbers) != 2]
+    chains = []
+    for start in [*(node for node in starts for _ in at[node]), *at]:
+        nodes, passed = [start], []
+        while True:
+            follow = [n for n in at[nodes[-1]] if n in left]
+            if not follow or (len(nodes) > 1 and len(at[nodes[-1]]) != 2):
+                break
+            left.remove(follow[0])
+            passed.append(follow[0])
+            first, last = pairs[follow[0]]
+            nodes.append(last if first == nodes[-1] else first)
+        if passed:
+            numbers = np.array(passed)
+            chains.append((np.array(nodes), numbers, edges[0, numbers] == np.array(nodes[:-1])))
+    return chains
+
+
+def _bends(x: np.ndarray, near: float, arcs: bool) -> np.ndarray:
+    """Curvatures (2, n) of a chain of nodes (2, n + 1) at both ends of edges, positive to the left."""
+    closed = x.shape[1] > 3 and np.array_equal(x[:, 0], x[:, -1])
+    turn, length = _turns(x, closed)
+    corner = _corners(turn, length)
+    if closed:  # begins at a corner, or where the curvature changes most
+        curvature = turn[:-1] / length
+        jump = np.abs(curvature - np.roll(curvature, 1)) + np.where(corner[:-1], np.inf, 0.0)
+        first = int(np.argmax(jump))
+        if first:
+            order = np.roll(np.arange(len(length)), -first)
+            return np.asarray(np.roll(_bends(x[:, np.append(order, first)], near, arcs), first, axis=1))
+    runs = np.full(len(length), np.nan)  # the curvature of the run that an edge belongs to
+    cuts = np.unique([0, *np.flatnonzero(corner), len(length)])
+    for first, last in pairwise(cuts.tolist()):
+        for start, end, bend in _runs(x[:, first : last + 1], near):
+            runs[first + start : first + end] = bend
+    return _ends(turn, length, corner, runs, closed, arcs)
+
+
+def _turns(x: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Turns (n + 1,) of a chain at its nodes [rad], nan at open ends, and lengths (n,) of edges."""
+    steps = np.diff(x, axis=1)
+    length, direction = np.hypot(*steps), np.arctan2(*steps[::-1])
+    turn = np.full(x.shape[1], np.nan)
+    turn[1:-1] = np.diff(direction)
+    if closed:
+        turn[[0, -1]] = direction[0] - direction[-1]
+    return (turn + np.pi) % (2 * np.pi) - np.pi, length
+
+
+def _corners(turn: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Whether nodes are corners: where the turn is large, or far larger than next to it, or ends."""
+    spacing = np.concatenate([length[-1:], length, length[:1]])
+    span = (spacing[:-1] + spacing[1:]) / 2
+    rate = np.where(np.isnan(turn), 0.0, np.abs(turn)) / np.minimum(spacing[:-1], spacing[1:])
+    beside = np.concatenate([rate[-2:-1], rate, rate[1:2]])
+    expected = np.maximum(beside[:-2], beside[2:]) * span
+    kink = (np.abs(turn) > KINK[0]) & (np.abs(turn) > KINK[1] * expected)
+    return np.isnan(turn) | (~_on_fillet(turn, length) & ((np.abs(turn) > CORNER) | kink))
+
+
+def _on_fillet(turn: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Whether nodes lie on an arc of few chords: one tangent to the edges before and after it.
+
+    A chord of an arc of curvature k turns by twice asin(k c / 2), half of it at each end.
+    """
+    count = len(turn) - 1 if turn[0] == turn[-1] else len(turn)  # a closed chain ends where it begins
+    after = np.resize(np.append(length, [np.nan] * (count - len(length))), count)
+    before = np.roll(after, 1)
+    across = before**2 + after**2 + 2 * before * after * np.cos(turn[:count])
+    bend = 2 * np.sin(turn[:count]) / np.sqrt(across)
+    found = np.zeros(count, dtype=bool)
+    for node in np.flatnonzero((np.abs(turn[:count]) > CORNER) & (np.abs(turn[:count]) < LARGEST)):
+        alike = np.abs(bend - bend[node]) < ALIKE * np.abs(bend[node])
+        first = last = int(node)
+        while alike[(first - 1) % count] and last - first < count - 2:
+            first -= 1
+        while alike[(last + 1) % count] and last - first < count - 2:
+            last += 1
+        ends = np.array([first - 1, last + 1]) % count
+        half = np.arcsin(bend[node] * np.array([before[first % count], after[last % count]]) / 2)
+        if np.all(np.abs(turn[ends] - half) < ALIKE):
+            found[np.arange(first - 1, last + 2) % count] = True
+    return np.resize(found, len(turn))
+
+
+def _runs(x: np.ndarray, near: float) -> list[tuple[int, int, float]]:
+    """First and last node, and curvature, of runs of three nodes on a line or four on a circle."""
+    found, start, last = [], 0, x.shape[1] - 1
+    steps = np.diff(x, axis=1)
+    area = np.hypot(*steps[:, :-1]) * np.hypot(*steps[:, 1:])
+    across = steps[:, :-1] + steps[:, 1:]
+    off = (steps[0, :-1] * steps[1, 1:] - steps[1, :-1] * steps[0, 1:]) / np.hypot(
+        *across
+    )  # from the neighbours' chord
+    straight = np.abs(off) <= 2 * near
+    even = np.abs(np.diff(off / area)) <= 2 * near * (
+        1 / area[:-1] + 1 / area[1:]
+    )  # the same curvature at the next node
+    while start < last:
+        line = arc = start
+        if start < len(straight) and straight[start]:
+            line = _reach(x, start, lambda nodes: _on_line(nodes, near))
+        if start < len(even) and even[start]:
+            arc = _reach(x, start, lambda nodes: _circle(nodes, near) is not None)
+        if line - start >= 2 and arc - start <= 2 * (line - start):
+            found.append((start, line, 0.0))
+            start = line
+        elif arc - start >= 3:
+            found.append((start, arc, _circle(x[:, start : arc + 1], near) or 0.0))
+            start = arc
+        else:
+            start += 1
+    return found
+
+
+def _reach(x: np.ndarray, start: int, fits: Callable[[np.ndarray], bool]) -> int:
+    """The last node such that all from `start` to it fit, found by doubling and halving steps."""
+    good, end, step = start + 1, x.shape[1] - 1, 1
+    while step and good < end:
+        last = min(good + step, end)
+        if fits(x[:, start : last + 1]):
+            good, step = last, 2 * step
+        else:
+            break
+    while step > 1:
+        step //= 2
+        if good + step <= end and fits(x[:, start : good + step + 1]):
+            good += step
+    return good
+
+
+def _on_line(nodes: np.ndarray, near: float) -> bool:
+    """Whether nodes lie on the line through the first and the last one."""
+    along, offset = nodes[:, -1] - nodes[:, 0], nodes - nodes[:, :1]
+    return bool(np.all(np.abs(along[0] * offset[1] - along[1] * offset[0]) <= near * np.hypot(*along)))
+
+
+def _circle(nodes: np.ndarray, near: float) -> float | None:
+    """The curvature of the circle on which nodes (2, m) lie, positive to the left; None off it."""
+    middle = nodes.mean(axis=1, keepdims=True)
+    size = np.abs(nodes - middle).max()
+    offset = (nodes - middle) / size
+    terms = np.column_stack([2 * offset.T, np.ones(nodes.shape[1])])
+    x, y, rest = np.linalg.lstsq(terms, np.sum(offset**2, axis=0), rcond=None)[0]
+    radius = np.sqrt(max(rest + x**2 + y**2, 0.0))
+    away = offset - np.array([[x], [y]])
+    if radius == 0.0 or np.any(np.abs(np.hypot(*away) - radius) * size > near):
+        return None
+    sweep = np.sum(away[0, :-1] * away[1, 1:] - away[1, :-1] * away[0, 1:])
+    return float(np.sign(sweep) / (radius * size))
+
+
+def _ends(
+    turn: np.ndarray, length: np.ndarray, corner: np.ndarray, runs: np.ndarray, closed: bool, arcs: bool
+) -> np.ndarray:
+    """Curvatures (2, n) at both ends of edges, of their runs or of circles through three nodes."""
+    n = len(length)
+    free = np.isnan(runs)
+    if arcs:
+        return np.tile(np.where(free, 0.0, runs), (2, 1))
+    edge = np.arange(n)
+    found = np.empty((2, n))
+    for side, node, beside in ((0, edge, edge - 1), (1, edge + 1, (edge + 1) % n)):
+        # the chord between the two neighbours of the node
+        across = np.sqrt(length**2 + length[beside] ** 2 + 2 * length * length[beside] * np.cos(turn[node]))
+        three = 2 * np.sin(turn[node]) / across
+        away = turn[node] - np.arcsin(np.clip(runs[beside] * length[beside] / 2, -STEEP, STEEP))
+        found[side] = np.where(free[beside], three, 2 * np.sin(away) / length)
+        found[side, corner[node]] = np.nan
+    found = np.where(np.isnan(found), found[::-1], found)  # at a corner as at the other end
+    found = np.where(np.isnan(found), 0.0, found)
+    return np.clip(np.where(free, found, runs), -2 * STEEP / length, 2 * STEEP / length)
+
+
+class _Blends:
+    """Edges with ends (2, 2, e) and the curvatures (2, e) of the arcs blended over them."""
+
+    def __init__(self, corners: np.ndarray, bends: np.ndarray) -> None:
+        self.start, self.bends = corners[:, 0], bends
+        along = corners[:, 1] - corners[:, 0]
+        self.length = np.hypot(*along)
+        self.along = along / self.length
+        self.tree = cKDTree(corners.mean(axis=1).T)
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """The places (2, m) of points near the edges."""
+        edge = self._nearest(points)
+        s, c = self._foot(points, edge)[0], self.length[edge]
+        rest = s * (c - s)
+        arcs = [
+            k * rest / (np.sqrt(root**2 + k**2 * rest) + root)
+            for k in self.bends[:, edge]
+            for root in [np.sqrt(1 - (k * c / 2) ** 2)]
+        ]
+        height = (1 - s / c) * arcs[0] + s / c * arcs[1]
+        x, y = self.along[:, edge]
+        return np.asarray(self.start[:, edge] + s * np.stack([x, y]) + height * np.stack([y, -x]))
+
+    def _foot(self, points: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far along edges the points nearest to points (2, ...) are, and how far from these."""
+        offset, along = points - self.start[:, edge], self.along[:, edge]
+        s = np.clip(np.sum(offset * along, axis=0), 0, self.length[edge])
+        return s, np.linalg.norm(offset - s * along, axis=0)
+
+    def _nearest(self, points: np.ndarray) -> np.ndarray:
+        """The number (m,) of the nearest edge."""
+        count = min(NEAREST, len(self.length))
+        far, near = (each.reshape(points.shape[1], count) for each in self.tree.query(points.T, k=count))
+        distance = self._foot(points[:, :, None], near)[1]
+        best = np.argmin(distance, axis=1)
+        rows = np.arange(len(best))
+        found = near[rows, best]
+        if count == len(self.length):
+            return found
+        unsure = np.flatnonzero(distance[rows, best] > far[:, -1] - self.length.max() / 2)
+        for some in np.array_split(unsure, 1 + len(unsure) * len(self.length) // ARRAY):
+            everywhere = np.broadcast_to(np.arange(len(self.length)), (len(some), len(self.length)))
+            found[some] = np.argmin(self._foot(points[:, some][:, :, None], everywhere)[1], axis=1)
+        return found

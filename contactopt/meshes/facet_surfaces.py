@@ -1,0 +1,346 @@
+"""The surface that the facets of a solid stand for: planes, spheres, cylinders, curved patches.
+
+Facets are cut into triangles. Where two of them meet at a large angle the body has an edge; between
+the edges facets in one plane are flat, and the others form regions. The nodes of a region may lie
+on a sphere or on a cylinder. Every other region is a patch of quadratic triangles,
+
+    x = sum_i l_i x_i + 4 sum_ij l_i l_j d_ij        (l: barycentric coordinates, i < j),
+
+where d_ij leads from the middle of an edge to the surface: to the node there, of elements of second
+order; for others by the normals n at its ends, d = n ((n_j - n_i) . (x_j - x_i)) / 8, which a
+quadratic fits to the nodes around a vertex, or which are those of a flat facet there. Points in the
+plane of a flat facet at an edge of the body stay in it.
+
+Source: Nagata (2005), Simple local interpolation of surfaces using normal vectors, Computer Aided
+Geometric Design 22."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from contactopt.meshes.cells import is_curved
+from contactopt.meshes.curves import CORNER, STRAIGHT, rounding, shares
+from contactopt.meshes.given_curves import Curve
+from contactopt.meshes.mesh_repair import outer_corners
+
+EDGE = np.deg2rad(60)  # turn of facets of second order from which on there is an edge of the body
+FIT = 1e-7  # of its size: how near the nodes of a region lie to a sphere or cylinder, at least
+FEWEST = 6  # any so many nodes may lie on a sphere or cylinder
+SAMPLE = 1000  # nodes to which spheres and cylinders are fitted
+NEAREST = 16  # triangles among which the one nearest to a point is looked for
+ALTERNATE = 60  # projections on a surface and on a plane in turn
+PREFER = 1e-6  # by how much less a curved triangle may be near than a flat one
+Shape = Callable[[np.ndarray], np.ndarray]
+
+
+def space_curves(mesh: Any, arcs: bool) -> dict[str, Curve | None]:
+    """Find the surfaces of all boundaries of a solid's mesh; those without a name have the name ''.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh in space.
+    arcs
+        Whether only spheres and cylinders count as curved, where the edges of the mesh are straight.
+
+    Returns
+    -------
+    dict
+        By name the surface, or None where the boundary is flat.
+    """
+    skin = _Skin(mesh, arcs)
+    return {
+        name: Curve(_Patches(skin, mine), skin.known, label) if np.any(skin.region[mine] >= 0) else None
+        for name, label, mine in shares(mesh, skin.owner)
+    }
+
+
+class _Skin:
+    """The triangles of the surface of a mesh.
+
+    nodes    (3, t) their corners;   owner  (t,) the facet of the mesh
+    corners  (3, 3, t) places of the corners
+    off      (3, 3, t) from the middles of edges 01, 12, 20 to the surface
+    planes   (3, 3, t) normals of flat triangles beyond these edges, nan where the body has no edge
+    region   (t,) the number of the region, -1 of flat triangles
+    shapes   of each region its sphere or cylinder, or None
+    known    whether the mesh has curved edges
+    """
+
+    def __init__(self, mesh: Any, arcs: bool) -> None:
+        self.nodes, self.owner, middles = _triangles(mesh)
+        self.corners = mesh.p[:, self.nodes]
+        chords = (self.corners + np.roll(self.corners, -1, axis=1)) / 2
+        self.off = middles - chords
+        length = np.linalg.norm(np.roll(self.corners, -1, axis=1) - self.corners, axis=0)
+        self.known = bool(np.any(np.linalg.norm(self.off, axis=0) > STRAIGHT * length))
+        self.near = rounding(self.corners.reshape(3, -1))
+        cross = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0], axis=0)
+        self.normals = cross / np.linalg.norm(cross, axis=0)
+        pairs, sides = _neighbours(self.nodes)
+        turn = np.arccos(np.clip(np.sum(self.normals[:, pairs[0]] * self.normals[:, pairs[1]], axis=0), -1, 1))
+        smooth = turn < (EDGE if self.known else CORNER)
+        flat = self._flat(pairs, sides, smooth)
+        self.planes = np.full_like(self.off, np.nan)
+        for here, there in ((0, 1), (1, 0)):
+            rim = ~smooth & flat[pairs[there]]
+            self.planes[:, sides[here, rim], pairs[here, rim]] = self.normals[:, pairs[there, rim]]
+        inner = smooth & ~flat[pairs[0]] & ~flat[pairs[1]]
+        self.region = np.where(flat, -1, _components(pairs[:, inner], len(flat)))
+        self.region[~flat] = np.unique(self.region[~flat], return_inverse=True)[1]
+        self.shapes = [self._shape(region) for region in range(self.region.max(initial=-1) + 1)]
+        free = np.array([shape is None for shape in self.shapes] + [False])[self.region]
+        if not self.known and arcs:
+            self.region[free] = -1
+        elif not self.known:
+            self._guess(free, flat)
+
+    def _flat(self, pairs: np.ndarray, sides: np.ndarray, smooth: np.ndarray) -> np.ndarray:
+        """(t,) whether a triangle is flat, with its piece of the surface or all others at a corner."""
+        level = smooth.copy()
+        for here, there in ((0, 1), (1, 0)):
+            opposite = self.corners[:, (sides[there] + 2) % 3, pairs[there]]
+            height = np.sum((opposite - self.corners[:, 0, pairs[here]]) * self.normals[:, pairs[here]], axis=0)
+            level &= np.abs(height) < 2 * self.near
+        count = len(self.owner)
+        straight = np.all(np.abs(np.sum(self.off * self.normals[:, None], axis=0)) < 2 * self.near, axis=0)
+        piece = _components(pairs[:, smooth], count)
+        bent = np.zeros(count, dtype=bool)
+        bent[piece[pairs[0, smooth & ~level]]] = True
+        bent[piece[~straight]] = True
+        around = np.bincount(self.nodes.ravel())
+        ends = np.stack([self.nodes[sides[0], pairs[0]], self.nodes[(sides[0] + 1) % 3, pairs[0]]])
+        whole = np.bincount(ends[:, level].ravel(), minlength=len(around)) == around
+        return np.asarray(straight & (~bent[piece] | whole[self.nodes].any(axis=0)))
+
+    def _shape(self, region: int) -> Shape | None:
+        mine = self.region == region
+        points = [self.corners[:, :, mine].reshape(3, -1)]
+        if self.known:
+            chords = (self.corners + np.roll(self.corners, -1, axis=1)) / 2
+            points.append((chords + self.off)[:, :, mine].reshape(3, -1))
+        places = np.unique(np.concatenate(points, axis=1), axis=1)
+        near = max(self.near, FIT * np.ptp(places, axis=1).max())
+        return _sphere(places, near) or _cylinder(places, self.normals[:, mine], near)
+
+    def _guess(self, free: np.ndarray, flat: np.ndarray) -> None:
+        """Set the middles of the edges in free regions by the normals at their ends."""
+        given = np.full((3, self.nodes.max() + 1), np.nan)
+        given[:, self.nodes[:, flat]] = self.normals[:, None, flat]
+        places = np.empty_like(given)
+        places[:, self.nodes] = self.corners
+        for region in np.unique(self.region[free]):
+            mine = np.flatnonzero(self.region == region)
+            normals = _vertex_normals(places, self.nodes[:, mine], self.normals[:, mine], given)
+            at = normals[:, self.nodes[:, mine]]
+            mean, change = (at + np.roll(at, -1, axis=1)) / 2, np.roll(at, -1, axis=1) - at
+            along = np.roll(self.corners[:, :, mine], -1, axis=1) - self.corners[:, :, mine]
+            mean = mean / np.linalg.norm(mean, axis=0)
+            self.off[:, :, mine] = mean * np.sum(change * along, axis=0) / 8
+
+
+def _triangles(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corners (3, t) of the triangles, their facets (t,), and the middles (3, 3, t) of their edges."""
+    facets = mesh.boundary_facets()
+    nodes = outer_corners(mesh, facets)
+    quads = len(nodes) == 4
+    tri = np.concatenate([nodes[[0, 1, 2]], nodes[[0, 2, 3]]], axis=1) if quads else nodes
+    ends = np.stack([tri, np.roll(tri, -1, axis=0)])
+    middles = mesh.p[:, ends].mean(axis=1)
+    if is_curved(mesh):
+        size = mesh.nvertices
+        keys, wanted = (np.minimum(*each) * size + np.maximum(*each) for each in (mesh.edges.astype(np.int64), ends))
+        order = np.argsort(keys)
+        place = order[np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)]
+        there = keys[place] == wanted  # diagonals of quadrilaterals are no edges
+        middles[:, there] = mesh.doflocs[:, mesh.dofs.edge_dofs[0, place[there]]]
+        if quads:
+            centres = mesh.doflocs[:, mesh.dofs.facet_dofs[0, facets]]
+            middles[:, 2, : len(facets)] = middles[:, 0, len(facets) :] = centres
+    return tri, np.tile(facets, 2) if quads else facets, middles
+
+
+def _neighbours(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (2, m) that share an edge, and which of the edges 01, 12, 20 it is of each."""
+    count = nodes.shape[1]
+    ends = np.sort(np.stack([nodes, np.roll(nodes, -1, axis=0)]), axis=0).reshape(2, -1)
+    order = np.lexsort(ends)
+    same = np.all(ends[:, order[1:]] == ends[:, order[:-1]], axis=0)
+    first, second = order[:-1][same], order[1:][same]
+    return np.stack([first, second]) % count, np.stack([first, second]) // count
+
+
+def _components(pairs: np.ndarray, count: int) -> np.ndarray:
+    """(count,) the number of the piece that each belongs to when pairs (2, m) are joined."""
+    graph = coo_matrix((np.ones(pairs.shape[1]), tuple(pairs)), (count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def _vertex_normals(places: np.ndarray, nodes: np.ndarray, normals: np.ndarray, given: np.ndarray) -> np.ndarray:
+    """Normals (3, n) at the nodes of a region: those given, or of quadratics through the nodes around."""
+    size = places.shape[1]
+    found = np.zeros((3, size))
+    for row in nodes:
+        np.add.at(found.T, row, normals.T)
+    mine = np.unique(nodes)
+    found[:, mine] /= np.linalg.norm(found[:, mine], axis=0)
+    ends = (
+        np.concatenate([nodes, np.roll(nodes, -1, axis=0)], axis=1),
+        np.concatenate([np.roll(nodes, -1, axis=0), nodes], axis=1),
+    )
+    near = csr_matrix((np.ones(ends[0].size), (ends[0].ravel(), ends[1].ravel())), (size, size))
+    around = near + near @ near
+    for node in mine.tolist():
+        others = around.indices[around.indptr[node] : around.indptr[node + 1]]
+        others = others[others != node]
+        if not np.isnan(given[0, node]):
+            found[:, node] = given[:, node]
+        elif len(others) >= 5:
+            axes = np.linalg.svd(found[:, [node]])[0]  # the normal and two directions along the surface
+            z, x, y = axes.T @ (places[:, others] - places[:, [node]])
+            weight = 1 / (x**2 + y**2)
+            terms = np.stack([x, y, x**2, x * y, y**2], axis=1)
+            slope = np.linalg.lstsq(terms * weight[:, None], z * weight, rcond=None)[0]
+            normal = axes @ np.array([1.0, -slope[0], -slope[1]])
+            found[:, node] = np.sign(normal @ found[:, node]) * normal / np.linalg.norm(normal)
+    return found
+
+
+def _sphere(places: np.ndarray, near: float) -> Shape | None:
+    """The projection on the sphere on which places (3, m) lie."""
+    centre, radius = _round(places)
+    if places.shape[1] <= FEWEST or np.any(np.abs(np.linalg.norm(places - centre, axis=0) - radius) > near):
+        return None
+
+    def project(points: np.ndarray) -> np.ndarray:
+        away = points - centre
+        return np.asarray(centre + radius * away / np.linalg.norm(away, axis=0))
+
+    return project
+
+
+def _cylinder(places: np.ndarray, normals: np.ndarray, near: float) -> Shape | None:
+    """The projection on the cylinder on which places (3, m) lie; its facets are along its axis."""
+    few = places[:, :: 1 + places.shape[1] // SAMPLE]
+    frame = np.linalg.eigh(normals @ normals.T)[1]  # the first direction is the axis, about
+
+    def section(tilt: np.ndarray) -> np.ndarray:
+        axis = frame @ np.array([1.0, *tilt])
+        axis = axis / np.linalg.norm(axis)
+        return np.asarray(np.linalg.svd(axis[None])[2][1:])  # (2, 3) directions across the axis
+
+    def off(tilt: np.ndarray, x: np.ndarray = few) -> np.ndarray:
+        flat = section(tilt) @ x
+        centre, radius = _round(section(tilt) @ few)
+        return np.asarray(np.linalg.norm(flat - centre, axis=0) - radius)
+
+    size = np.ptp(places, axis=1).max()
+    best = least_squares(lambda tilt: off(tilt) / size, np.zeros(2), x_scale=0.1, xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+    if places.shape[1] <= FEWEST or np.any(np.abs(off(best, places)) > near):
+        return None
+    across = section(best)
+    centre, radius = _round(across @ few)
+
+    def project(points: np.ndarray) -> np.ndarray:
+        away = across @ points - centre
+        return np.asarray(points + across.T @ (away * (radius / np.linalg.norm(away, axis=0) - 1)))
+
+    return project
+
+
+def _round(places: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre (dim, 1) and radius of the circle or sphere that fits places (dim, m) best."""
+    middle = places.mean(axis=1, keepdims=True)
+    offset = places - middle
+    size = max(np.abs(offset).max(), 1e-300)
+    offset = offset / size
+    terms = np.column_stack([2 * offset.T, np.ones(offset.shape[1])])
+    *centre, rest = np.linalg.lstsq(terms, np.sum(offset**2, axis=0), rcond=None)[0]
+    radius = np.sqrt(max(rest + np.sum(np.square(centre)), 0.0))
+    return middle + size * np.array(centre)[:, None], float(size * radius)
+
+
+class _Patches:
+    """The surface of some of the triangles."""
+
+    def __init__(self, skin: _Skin, mine: np.ndarray) -> None:
+        self.corners, self.off, self.planes = skin.corners[:, :, mine], skin.off[:, :, mine], skin.planes[:, :, mine]
+        self.region, self.shapes, self.near = skin.region[mine], skin.shapes, skin.near
+        self.tree = cKDTree(self.corners.mean(axis=1).T)
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """The places (3, m) of points near the triangles."""
+        count = min(NEAREST, len(self.region))
+        near = self.tree.query(points.T, k=count)[1].reshape(points.shape[1], count)
+        weights, outside = barycentric(self.corners[:, :, near], points)
+        best = np.argmin(outside + PREFER * (self.region[near] < 0), axis=1)
+        rows = np.arange(len(best))
+        chosen, share = near[rows, best], np.clip(weights[rows, best].T, 0, 1)
+        share = share / share.sum(axis=0)
+        found = points.copy()
+        for region in np.unique(self.region[chosen]):
+            if region >= 0:
+                some = np.flatnonzero(self.region[chosen] == region)
+                found[:, some] = self._on(region, points[:, some], chosen[some], share[:, some])
+        return found
+
+    def _on(self, region: int, points: np.ndarray, chosen: np.ndarray, share: np.ndarray) -> np.ndarray:
+        """Points on triangles of a region; those in a plane beyond an edge of the body stay in it."""
+        shape = self.shapes[region]
+        if shape is None:
+            found = np.einsum("ict,ct->it", self.corners[:, :, chosen], share)
+            found = found + 4 * np.einsum("iet,et->it", self.off[:, :, chosen], share * np.roll(share, -1, axis=0))
+        else:
+            found = shape(points)
+        for edge in range(3):
+            normal = self.planes[:, edge, chosen]
+            height = np.sum(normal * (points - self.corners[:, edge, chosen]), axis=0)
+            rim = np.abs(height) < 2 * self.near  # nothing where there is no plane
+            if rim.any():
+                found[:, rim] = _in_plane(found[:, rim], points[:, rim], normal[:, rim], shape)
+        return found
+
+
+def _in_plane(found: np.ndarray, points: np.ndarray, normal: np.ndarray, shape: Shape | None) -> np.ndarray:
+    """Places (3, m) moved into the planes of the points, and along them to the surface."""
+    if shape is None:
+        off = found - points
+        inside = off - normal * np.sum(off * normal, axis=0)
+        size = np.sum(inside**2, axis=0)
+        return np.asarray(points + inside * np.where(size > 0, np.sum(off**2, axis=0) / np.where(size > 0, size, 1), 0))
+    for _ in range(ALTERNATE):
+        found = found - normal * np.sum((found - points) * normal, axis=0)
+        found = shape(found)
+    return np.asarray(found - normal * np.sum((found - points) * normal, axis=0))
+
+
+def barycentric(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Barycentric coordinates of points in facets, and how far they are from these.
+
+    Parameters
+    ----------
+    corners
+        (dim, dim, m, c) corners of c edges or triangles for each point [length].
+    points
+        (dim, m) points [length].
+
+    Returns
+    -------
+    tuple
+        Coordinates (m, c, dim) of the nearest points of the lines or planes, and distances (m, c)
+        over the sizes of the facets.
+    """
+    origin, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
+    offset = points[:, :, None] - origin
+    gram = np.einsum("iafc,ibfc->fcab", edges, edges)
+    weights = np.linalg.solve(gram, np.einsum("iafc,ifc->fca", edges, offset)[..., None])[..., 0]
+    every = np.concatenate([1 - weights.sum(axis=-1, keepdims=True), weights], axis=-1)
+    height = np.linalg.norm(offset - np.einsum("iafc,fca->ifc", edges, weights), axis=0)
+    return every, np.maximum(-every, 0).max(axis=-1) + height / np.sqrt(np.trace(gram, axis1=2, axis2=3))

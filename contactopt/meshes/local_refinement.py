@@ -1,0 +1,292 @@
+"""Meshes divided everywhere or where marked; boundaries keep their names and their curvature.
+
+scikit-fem divides the elements: all of them into halves, or marked ones, by red, green and blue
+patterns in the plane and by bisection in space. It forgets the named boundaries. Every new boundary
+facet lies in one old boundary facet, which gives it its names. New nodes then move to the surface
+that the mesh stands for, which `boundary_curves` finds."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import skfem
+from scipy.spatial import cKDTree
+
+from contactopt.errors import InputError
+from contactopt.meshes.cells import CURVED, is_curved, straight
+from contactopt.meshes.curves import CORNER as CORNER
+from contactopt.meshes.curves import plane_curves
+from contactopt.meshes.facet_surfaces import barycentric, space_curves
+from contactopt.meshes.given_curves import Curve as Curve
+from contactopt.meshes.mesh_repair import volumes
+
+log = logging.getLogger(__name__)
+NEAREST = 16  # old facets among which the one that holds a new facet is looked for
+FLAT = 0.1  # least share of its volume that an element keeps where its nodes move to a curve
+BENT = 0.15  # sagitta of an edge over its length, beyond which the mesh is too coarse for its curve
+SMALLEST = 1e-10  # elements are not divided below this fraction of the coordinates or of the body
+Function = Callable[[np.ndarray], np.ndarray]
+Curves = Mapping[str, Function | None]  # by the name of the boundary; None where it is flat
+
+
+class TooSmall(InputError):
+    """All marked elements are so small that their halves would have no volume for rounding."""
+
+
+def boundary_curves(mesh: Any, arcs: bool = False) -> dict[str, Curve | None]:
+    """Find the line or surface that each boundary of a mesh stands for.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh in the plane or in space.
+    arcs
+        Whether only arcs, spheres and cylinders count as curved, where the mesh has straight edges.
+
+    Returns
+    -------
+    dict
+        By the name of the boundary its curve, or None where it is flat. The name '' stands for what
+        has no name.
+    """
+    return plane_curves(mesh, arcs) if len(mesh.p) == 2 else space_curves(mesh, arcs)
+
+
+def boundary_curve(mesh: Any, name: str, arcs: bool = False) -> Curve | None:
+    """Find the line or surface of one boundary, as `boundary_curves` finds those of all.
+
+    Parameters
+    ----------
+    mesh, arcs
+        As there.
+    name
+        One of its boundaries, or ''.
+
+    Returns
+    -------
+    Curve or None
+        Its curve; None where it is flat.
+    """
+    return boundary_curves(mesh, arcs)[name]
+
+
+def simplices(mesh: Any) -> Any:
+    """Cut a mesh into straight triangles or tetrahedra.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh. Its quadrilaterals and hexahedra are cut, its curved edges become straight.
+
+    Returns
+    -------
+    Mesh
+        The mesh of simplices, with the names of the boundaries.
+    """
+    if is_curved(mesh):
+        mesh = replace(straight(mesh), _boundaries=mesh.boundaries)
+    if isinstance(mesh, skfem.MeshQuad):
+        return named_like(mesh, replace(mesh.to_meshtri(), _boundaries=None))
+    if isinstance(mesh, skfem.MeshHex):
+        return named_like(mesh, replace(mesh.to_meshtet(), _boundaries=None))
+    return mesh
+
+
+def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
+    """Divide the marked elements of a mesh, and others as far as it takes to stay conforming.
+
+    Elements that are as small as rounding allows stay whole. A new node stays on its edge where it would turn an element
+    inside out on the curve.
+
+    Parameters
+    ----------
+    mesh
+        A mesh of straight triangles or tetrahedra, with named boundaries.
+    marked
+        Numbers of the elements to divide.
+    curves
+        For the names of curved boundaries, a function (dim, k) -> (dim, k) that puts new nodes on
+        the true surface. The name '' stands for the boundary that has no name.
+
+    Returns
+    -------
+    Mesh
+        A mesh of the same kind with the same named boundaries.
+
+    Raises
+    ------
+    TooSmall
+        If none of the marked elements can be divided.
+    """
+    marked = np.asarray(marked)
+    corners = mesh.p[:, mesh.t[:, marked]]
+    size = np.ptp(corners, axis=1).max(axis=0)
+    scale = max(np.abs(mesh.p).max(), np.ptp(mesh.p, axis=1).max())
+    large = size > SMALLEST * scale
+    if len(marked) and not large.any():
+        place = ", ".join(f"{x:.6g}" for x in corners[:, :, 0].mean(axis=1))
+        raise TooSmall(f"the elements near ({place}) cannot be divided further: they are as small as rounding allows.")
+    return _refined(mesh, marked[large], curves)
+
+
+def split(mesh: Any, curves: Curves) -> Any:
+    """Halve all elements of a mesh, with new nodes of curved boundaries on their curves.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh of any kind; of second order, its nodes on edges and faces become corners.
+    curves
+        The curves of its boundaries, as for `divide`.
+
+    Returns
+    -------
+    Mesh
+        A mesh of the same kind and order of half the element size, with the same named boundaries.
+    """
+    fine = _refined(straight(mesh), 1, curves, mesh.doflocs if is_curved(mesh) else None)
+    return bent(fine, curves) if is_curved(mesh) else fine
+
+
+def _refined(mesh: Any, how: Any, curves: Curves, places: np.ndarray | None = None) -> Any:
+    """The mesh divided as scikit-fem is told, its new nodes at `places`, if given, and on the curves."""
+    with _no_word_of_copies():
+        fine = named_like(mesh, replace(mesh, _boundaries=None, _subdomains=None).refined(how))
+    new = np.arange(mesh.p.shape[1], fine.p.shape[1])
+    points = fine.p.copy() if places is None else places.copy()
+    for name, curve in _present(mesh, curves).items():
+        mine = np.intersect1d(new, np.unique(fine.facets[:, facets_of(fine, name)]))
+        if len(mine):
+            points[:, mine] = curve(points[:, mine])
+    return _unfolded(fine, points)
+
+
+def facets_of(mesh: Any, name: str) -> np.ndarray:
+    """The numbers of the facets of a boundary; the name '' stands for what has no name."""
+    if name:
+        return np.asarray(mesh.boundaries[name])
+    return np.setdiff1d(mesh.boundary_facets(), np.concatenate([[0][:0], *(mesh.boundaries or {}).values()]))
+
+
+def _present(mesh: Any, curves: Curves) -> dict[str, Function]:
+    """The curves of boundaries that have facets."""
+    return {name: curve for name, curve in curves.items() if curve is not None and len(facets_of(mesh, name))}
+
+
+def _unfolded(mesh: Any, points: np.ndarray) -> Any:
+    """The mesh with its nodes at `points`, but for those that would turn an element inside out."""
+    nodes, before = np.asarray(mesh.dofs.element_dofs if is_curved(mesh) else mesh.t), volumes(mesh)
+    sense, least = np.sign(before[:, -1:]), FLAT * np.abs(before).min(axis=1)
+    points, kept = points.copy(), 0
+    while (bad := (volumes(replace(mesh, doflocs=points)) * sense).min(axis=1) < least).any():
+        back = np.unique(nodes[:, bad])
+        back = back[np.any(points[:, back] != mesh.doflocs[:, back], axis=0)]
+        if not len(back):
+            break
+        points[:, back], kept = mesh.doflocs[:, back], kept + len(back)
+    if kept:
+        log.warning("%d nodes stay off the curved boundary, where they would turn elements inside out", kept)
+    return replace(mesh, doflocs=points)
+
+
+def bent(mesh: Any, curves: Curves) -> Any:
+    """Bend the edges and faces of a mesh of straight elements along its curved boundaries.
+
+    Elements and named boundaries keep their numbers. An edge that would leave its chord by more than BENT of its length,
+    or fold an element, stays straight.
+
+    Parameters
+    ----------
+    mesh
+        A scikit-fem mesh.
+    curves
+        By the name of a boundary the curve that moves points (dim, m) onto it [length].
+
+    Returns
+    -------
+    mesh
+        A mesh of second order, or the same mesh where there is no curve.
+    """
+    known = _present(mesh, curves)
+    if not known:
+        return mesh
+    with _no_word_of_copies():
+        made = CURVED[mesh.refdom.__name__].from_mesh(replace(mesh, _boundaries=None, _subdomains=None))
+    shift = np.zeros_like(made.doflocs)
+    plane = len(mesh.p) == 2
+    edges, middle = (mesh.facets, made.dofs.facet_dofs[0]) if plane else (mesh.edges, made.dofs.edge_dofs[0])
+    for name, curve in known.items():
+        facets = facets_of(mesh, name)
+        mine = facets if plane else np.unique(mesh.f2e[:, facets])
+        start, end = mesh.p[:, edges[:, mine]].transpose(1, 0, 2)
+        _shift(shift, middle[mine], (start + end) / 2, np.linalg.norm(end - start, axis=0), curve)
+    if isinstance(mesh, skfem.MeshHex):
+        faces = made.dofs.facet_dofs[0]
+        shift[:, faces] = shift[:, middle[mesh.f2e]].sum(axis=1) / 2
+        for name, curve in known.items():
+            own = facets_of(mesh, name)
+            corners = mesh.p[:, mesh.facets[:, own]]
+            _shift(shift, faces[own], corners.mean(axis=1), np.ptp(corners, axis=1).max(axis=0), curve)
+    local = shift[:, made.dofs.element_dofs]  # the node within follows those around it
+    if isinstance(mesh, skfem.MeshQuad):
+        shift[:, made.dofs.element_dofs[8]] = local[:, 4:8].sum(axis=1) / 2
+    elif isinstance(mesh, skfem.MeshHex):
+        shift[:, made.dofs.element_dofs[26]] = local[:, 20:26].sum(axis=1) / 2 - local[:, 8:20].sum(axis=1) / 4
+    return replace(_unfolded(made, made.doflocs + shift), _boundaries=mesh.boundaries)
+
+
+def _shift(shift: np.ndarray, nodes: np.ndarray, places: np.ndarray, size: np.ndarray, curve: Function) -> None:
+    """Write down how nodes at these places move to a curve, where it is near beside their size."""
+    off = curve(places) - places
+    near = np.linalg.norm(off, axis=0) <= BENT * size
+    shift[:, nodes[near]] = off[:, near]
+
+
+@contextmanager
+def _no_word_of_copies() -> Iterator[None]:
+    """scikit-fem says of large arrays that it copies them; no user can do anything about it."""
+    skfem_log = logging.getLogger("skfem.mesh.mesh")
+
+    def filtered(record: logging.LogRecord) -> bool:
+        return "C_CONTIGUOUS" not in record.getMessage()
+
+    skfem_log.addFilter(filtered)
+    try:
+        yield
+    finally:
+        skfem_log.removeFilter(filtered)
+
+
+def named_like(old: Any, new: Any) -> Any:
+    """Give a mesh the named boundaries of another one, whose boundary facets hold its own.
+
+    Parameters
+    ----------
+    old
+        A scikit-fem mesh with named boundaries.
+    new
+        A mesh of simplices of the same body, or of a part of it.
+
+    Returns
+    -------
+    mesh
+        `new` with the boundaries of `old`.
+    """
+    if not old.boundaries:
+        return new
+    dim, facets, outer = len(old.p), old.boundary_facets(), new.boundary_facets()
+    choices = list(combinations(range(len(old.facets)), dim))  # of quadrilaterals all triangles between their corners
+    corners = np.concatenate([old.p[:, old.facets[list(choice)][:, facets]] for choice in choices], axis=2)
+    facets = np.tile(facets, len(choices))
+    centres = new.p[:, new.facets[:, outer]].mean(axis=1)
+    count = min(NEAREST, len(facets))
+    near = cKDTree(corners.mean(axis=1).T).query(centres.T, k=count)[1].reshape(len(outer), count)
+    parent = facets[near[np.arange(len(outer)), np.argmin(barycentric(corners[:, :, near], centres)[1], axis=1)]]
+    names = {name: outer[np.isin(parent, members)] for name, members in old.boundaries.items()}
+    return replace(new, _boundaries={name: np.sort(members).astype(np.int32) for name, members in names.items()})

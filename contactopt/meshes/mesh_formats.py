@@ -1,0 +1,178 @@
+"""What a mesh file holds: nodes, elements, and the names of their groups, whatever its format.
+
+meshio reads the file. Formats keep groups in different ways: names of physical groups with a number for every element
+(Gmsh), sets of elements and of nodes by name (Abaqus), numbers alone (VTK, Medit, SU2, Nastran). Here all are names; a group
+without a name has its number as name.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import pickle
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.errors import InputError
+from contactopt.meshes.inp import read_inp
+from contactopt.meshes.msh4 import read_msh4, version
+
+MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
+# arrays of integers per element whose numbers are groups; those of others are named 'array=number'
+TAGS = (
+    "gmsh:physical",
+    "medit:ref",
+    "cell_tags",
+    "su2:tag",
+    "nastran:ref",
+    "avsucd:material",
+    "flac3d:group",
+    "netgen:index",
+)
+# formats whose readers end on damaged text; others, and those of binary files, may not
+SAFE = ("gmsh", "vtu", "vtk", "abaqus", "xdmf", "medit", "nastran", "med", "netgen", "avsucd")
+PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte
+MEMORY = 4_000_000_000, 50  # bytes that such a reader gets, and more per byte
+CHILD = """import contextlib, pickle, sys, meshio
+with contextlib.suppress(ImportError):  # not on Windows
+    import resource
+    resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[3]), int(sys.argv[3])))
+with contextlib.redirect_stdout(sys.stderr):
+    mesh = meshio.read(sys.argv[1], file_format=sys.argv[2])
+pickle.dump(mesh, sys.stdout.buffer)"""
+
+
+@dataclass(frozen=True, eq=False)
+class FileGroups:
+    """The contents of a mesh file.
+
+    points      (n, 2 or 3) coordinates in the unit of the file
+    blocks      (type in meshio, nodes (e, v), dimension) of each block of elements
+    members     (name, dimension) -> for each block the numbers of those elements that belong to the group
+    point_sets  name -> nodes
+    """
+
+    points: np.ndarray
+    blocks: tuple[tuple[str, np.ndarray, int], ...]
+    members: Mapping[tuple[str, int], Mapping[int, np.ndarray]]
+    point_sets: Mapping[str, np.ndarray]
+
+    def names(self, dim: int) -> list[str]:
+        """Names of the groups of elements of a dimension."""
+        return [name for name, dims in self.members if dims == dim]
+
+
+def read_groups(path: Path) -> FileGroups:
+    """Read a mesh file with its groups.
+
+    Parameters
+    ----------
+    path
+        A file in any format that meshio reads.
+
+    Returns
+    -------
+    FileGroups
+        Nodes, elements by their kind, and the groups of elements and of nodes by their names.
+
+    Raises
+    ------
+    InputError
+        In one sentence, whatever is wrong with the file.
+    """
+    mesh = _read(path)
+    blocks = tuple((block.type, np.asarray(block.data), int(block.dim)) for block in mesh.cells)
+    if not any(len(nodes) for _, nodes, _ in blocks):
+        raise InputError(f"mesh file '{path}': it holds no elements.")
+    for kind, nodes, _ in blocks:
+        if nodes.size and (nodes.min() < 0 or nodes.max() >= len(mesh.points)):
+            raise InputError(f"mesh file '{path}': a {kind} names a node that is not there.")
+    members: dict[tuple[str, int], dict[int, np.ndarray]] = {}
+
+    def add(name: str, i: int, elements: np.ndarray) -> None:
+        group = members.setdefault((name, blocks[i][2]), {})
+        group[i] = np.union1d(group.get(i, elements), elements)
+
+    for name, sets in mesh.cell_sets.items():
+        if not name.startswith("gmsh:"):
+            for i, found in enumerate(sets):
+                if found is not None and len(found):
+                    found = np.asarray(found)
+                    add(name, i, np.flatnonzero(found) if found.dtype == bool else found.astype(int))
+    named = {(int(tag), int(dim)): name for name, (tag, dim) in _numbered(mesh.field_data)}
+    for key, arrays in mesh.cell_data.items():
+        for i, values in enumerate(np.asarray(array) for array in arrays):
+            if key == "gmsh:geometrical" or values.dtype.kind not in "iu" or values.ndim != 1:
+                continue
+            for tag in np.unique(values):
+                number = f"{tag}" if key in TAGS else f"{key}={tag}"
+                name = named.get((int(tag), blocks[i][2]), number) if key == "gmsh:physical" else number
+                if tag != 0 or key not in TAGS:
+                    add(name, i, np.flatnonzero(values == tag))
+    sets = {name: np.asarray(nodes, dtype=int) for name, nodes in mesh.point_sets.items()}
+    return FileGroups(np.asarray(mesh.points), blocks, members, sets)
+
+
+def _numbered(field_data: Mapping) -> list[tuple[str, tuple[int, int]]]:
+    """Names of physical groups with their numbers and dimensions; other data of the file are passed over."""
+    return [(name, tuple(value)) for name, value in field_data.items() if np.shape(value) == (2,)]
+
+
+def _read(path: Path) -> Any:
+    import meshio
+
+    if not path.is_file():
+        what = "is a folder" if path.is_dir() else "is no file that can be read" if path.exists() else "does not exist"
+        raise InputError(f"mesh file '{path}' {what}.")
+    size = path.stat().st_size
+    if not 0 < size < MOST_BYTES:
+        raise InputError(f"mesh file '{path}' has {size} bytes; a mesh that can be solved has 1 to {MOST_BYTES:.0e}.")
+    endings = ["".join(path.suffixes[-n:]).lower() for n in range(len(path.suffixes), 0, -1)]
+    formats = [name for ending in endings for name in meshio.extension_to_filetypes.get(ending, ())]
+    if not formats:
+        raise InputError(
+            f"mesh file '{path}': its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp (Abaqus, CalculiX), ..."
+        )
+    said = ""
+    stated, binary = version(path) if "gmsh" in formats else (None, False)
+    if stated is not None and stated.partition(".")[0] not in ("2", "4"):
+        raise InputError(f"mesh file '{path}' is of version {stated} of Gmsh's format; save it in version 4.1 or 2.2.")
+    for newer in () if binary else (False, True):  # "4" stands for either
+        if stated in (("4", "4.1") if newer else ("4", "4.0")):
+            with contextlib.suppress(Exception):  # what is wrong with a damaged file is said below
+                return read_msh4(path, newer)
+    for name in sorted(formats, key=lambda name: name not in SAFE):
+        printed = io.StringIO()
+        try:  # on a damaged file readers raise anything, print what is wrong, and end the process
+            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
+                if name == "abaqus":
+                    return read_inp(path)
+                safe = name in SAFE and not binary
+                return meshio.read(path, file_format=name) if safe else _read_apart(path, name, size)
+        except (Exception, SystemExit) as error:
+            text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
+            said = said or " ".join(text.split())[:200] or type(error).__name__
+    raise InputError(
+        f"mesh file '{path}' cannot be read as {' or '.join(formats)} ({said}); it is damaged or of another "
+        "format" + ("; save Gmsh files as text in version 4.1 or 2.2." if "gmsh" in formats else ".")
+    )
+
+
+def _read_apart(path: Path, name: str, size: int) -> Any:
+    """The mesh, read by a process that is stopped if it takes too long."""
+    memory, patience = MEMORY[0] + MEMORY[1] * size, PATIENCE[0] + PATIENCE[1] * size
+    command = [sys.executable, "-c", CHILD, str(path), name, str(memory)]
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=patience, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise ValueError(f"no end after {patience:.0f} s") from error
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        raise ValueError(said[-1] if said else f"the reader ended with code {done.returncode}")
+    return pickle.loads(done.stdout)

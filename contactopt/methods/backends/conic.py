@@ -1,0 +1,125 @@
+"""Convex programs through cvxpy, compiled once and solved again with new parameters."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.linalg as la
+
+from contactopt.errors import BackendError
+from contactopt.linear.deadline import check_time
+from contactopt.methods.backends import CONIC, Backend, find
+
+if TYPE_CHECKING:
+    from contactopt.models import Program
+
+
+@dataclass(eq=False)
+class Conic:
+    """One of contactopt.models' programs and the backend that solves it."""
+
+    backend: Backend
+    program: Program
+
+    @classmethod
+    def using(cls, name: str, program: Program, Q: np.ndarray) -> Conic:
+        """Q is the quadratic form of the program; BackendError if it is not semidefinite."""
+        backend = find(name, CONIC)
+        check_semidefinite((Q + Q.T) / 2)
+        return cls(backend, program)
+
+    def solve(self, **parameters: np.ndarray) -> dict[str, np.ndarray]:
+        """The variables and multipliers of the program by name; BackendError, naming the backend, without an answer."""
+        for name, value in parameters.items():
+            self.program.parameters[name].value = value
+        run(self.backend, self.program.problem)
+        variables = {name: np.asarray(v.value) for name, v in self.program.variables.items()}
+        if not all(np.all(np.isfinite(v)) for v in variables.values()):
+            raise BackendError(f"conic backend '{self.backend.name}' gave an answer that is not finite.")
+        return variables | {name: np.nan_to_num(m) for name, m in self.program.multipliers.items()}
+
+
+@dataclass(eq=False)
+class DiscSOCP:
+    """models.tangential_disc_program, compiled once and solved again with new parameters."""
+
+    backend: Backend
+    program: Any
+    variable: Any
+    parameters: dict[str, Any]
+
+    @classmethod
+    def using(cls, name: str, Q: np.ndarray, A: np.ndarray) -> DiscSOCP:
+        from contactopt.models import tangential_disc_program
+
+        backend = find(name, CONIC)
+        Q = (Q + Q.T) / 2
+        check_semidefinite(Q)
+        return cls(backend, *tangential_disc_program(Q, A))
+
+    def solve(self, c: np.ndarray, b: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """t (2k,) and the multipliers (p,) of A t = b; BackendError, naming the backend, if there is no answer."""
+        self.parameters["c"].value, self.parameters["g"].value = c, radius
+        if len(b):
+            self.parameters["b"].value = b
+        run(self.backend, self.program)
+        t = np.asarray(self.variable.value)
+        if not np.all(np.isfinite(t)):
+            raise BackendError(f"conic backend '{self.backend.name}' gave an answer that is not finite.")
+        y = self.program.constraints[-1].dual_value if len(b) else np.zeros(0)
+        return t, np.asarray(y, dtype=float).reshape(len(b))
+
+
+def run(backend: Backend, problem: Any) -> None:
+    """Solve a cvxpy problem. The answer stands in its variables.
+
+    Parameters
+    ----------
+    backend
+        The conic backend.
+    problem
+        The cvxpy problem.
+
+    Raises
+    ------
+    BackendError
+        If the backend crashes or leaves no answer. The message names it.
+    """
+    import cvxpy as cp
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            for settings in backend.rounds():
+                problem.solve(solver=backend.name.upper(), **settings)
+                if problem.status == cp.OPTIMAL:
+                    break
+        check_time()
+    except (cp.SolverError, ValueError, ArithmeticError) as error:
+        raise BackendError(f"conic backend '{backend.name}' failed: {error}") from error
+    if any(v.value is None for v in problem.variables()):
+        raise BackendError(f"conic backend '{backend.name}' gave no answer: {problem.status}.")
+
+
+def check_semidefinite(Q: np.ndarray) -> None:
+    """Check that a matrix is positive semidefinite but for rounding, by a Cholesky factorisation.
+
+    cvxpy's own test of convexity fails at random and on small numbers.
+
+    Parameters
+    ----------
+    Q
+        (n, n) matrix.
+
+    Raises
+    ------
+    BackendError
+        If it is not.
+    """
+    try:
+        la.cholesky(Q + 1e-10 * np.trace(Q) / max(1, len(Q)) * np.eye(len(Q)), check_finite=False)
+    except la.LinAlgError as error:
+        raise BackendError("the compliance is not positive semidefinite, so its program is not convex.") from error

@@ -1,0 +1,82 @@
+"""Clarabel without a modelling language: set up once, then only the linear term changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.errors import BackendError
+from contactopt.linear.deadline import check_time, time_left
+from contactopt.methods.backends import CONIC, find
+from contactopt.methods.backends.conic import check_semidefinite
+
+
+@dataclass(eq=False)
+class CoulombSOCP:
+    """min r' Q r / 2 + c' r  subject to  |r_t| <= mu r_n at each contact,  V' r + s = 0, for many c.
+
+    Q (k dim, k dim) symmetric positive semidefinite, mu (k,), V (k dim, p), s (p,). As rows A r + y = b: y = 0 for the
+    balance and for the tangential part of contacts with mu = 0; y >= 0 for their normal part; y in the second-order
+    cone for the others.
+    """
+
+    solver: Any
+    multipliers: int
+
+    @classmethod
+    def using(cls, Q: np.ndarray, mu: np.ndarray, V: np.ndarray, s: np.ndarray) -> CoulombSOCP:
+        """BackendError if Q is not semidefinite, InputError if clarabel is not installed."""
+        backend = find("clarabel", CONIC)
+        import clarabel  # type: ignore[import-untyped]
+
+        Q = (Q + Q.T) / 2
+        check_semidefinite(Q)
+        k, p = len(mu), V.shape[1]
+        dim, rough = len(Q) // k, mu > 0
+        blocks = np.arange(k * dim).reshape(k, dim)
+        scale = np.ones((k, dim))
+        scale[rough, 0] = mu[rough]
+        rows = -sp.diags(scale.ravel()).tocsr()
+        smooth = ~rough
+        A = sp.vstack(
+            [
+                sp.csr_matrix(V.T),
+                rows[blocks[smooth, 1:].ravel()],
+                rows[blocks[smooth, 0]],
+                rows[blocks[rough].ravel()],
+            ],
+            format="csc",
+        )
+        cones = [(clarabel.ZeroConeT, p + smooth.sum() * (dim - 1)), (clarabel.NonnegativeConeT, smooth.sum())]
+        listed = [cone(int(size)) for cone, size in cones if size] + [clarabel.SecondOrderConeT(dim)] * int(rough.sum())
+        settings = clarabel.DefaultSettings()
+        for name, value in backend.settings.items():
+            setattr(settings, name, value)
+        settings.verbose, settings.presolve_enable, settings.max_threads = (
+            False,
+            False,
+            1,
+        )  # no presolve: it forbids updates
+        b = np.concatenate([-s, np.zeros(A.shape[0] - p)])
+        P = sp.triu(sp.csc_matrix(Q), format="csc")
+        return cls(clarabel.DefaultSolver(P, np.zeros(len(Q)), A, b, listed, settings), p)
+
+    def solve(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """r (k dim,) and the multipliers lambda (p,) of the balance; BackendError if there is no answer."""
+        self.solver.update(q=np.ascontiguousarray(c))
+        check_time()
+        left = time_left()
+        if isfinite(left):
+            settings = self.solver.get_settings()
+            settings.time_limit = left
+            self.solver.update(settings=settings)
+        answer = self.solver.solve()
+        check_time()
+        r, status = np.asarray(answer.x), str(answer.status)
+        if "Infeasible" in status or not np.all(np.isfinite(r)):
+            raise BackendError(f"conic backend 'clarabel' gave no answer: {status}.")
+        return r, np.nan_to_num(np.asarray(answer.z)[: self.multipliers])

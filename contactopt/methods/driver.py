@@ -1,0 +1,330 @@
+"""The driver of every method: clock, stopping rule, history, limits, certificate."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from contactopt.checks import check_number, real_array
+from contactopt.errors import BackendError, InputError
+from contactopt.linear.deadline import TimeUp, until
+from contactopt.linear.operators import InterfaceOperator, diagonal, loosened
+from contactopt.linear.stacked import Stacked
+from contactopt.methods import Repeated, default_method, find_method, solvers_of
+from contactopt.methods.method import Iterate, Known, Method, solves
+from contactopt.methods.notes import collected
+from contactopt.problem import (
+    InterfaceProblem,
+    Scales,
+    Solution,
+    Status,
+    dimensionless,
+    infeasibility,
+    natural_map_residual,
+)
+from contactopt.problem.certificate import Moved
+from contactopt.problem.unbalanced_loads import escape, sentence
+
+CYCLE = 12  # longest cycle that is looked for
+ROUGH = 1e-5  # accuracy of products in a rough certificate
+CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
+PROOF = 0.3, 5.0  # least and most seconds for the proof that a problem has no solution
+FAR = 0.1  # residual above which a method that has worked for long may be at a problem without a solution
+DOUBT = 1.0  # seconds of work after which the proof is first looked for; then after ten times as long, and so on
+SAME = 1e-11  # relative distance at which two iterates are the same state
+CONFIRM = 8  # repeated states in a row after which a method is not going anywhere; some change course before that
+
+
+def solve(
+    problem: InterfaceProblem,
+    method: str | Method | None = None,
+    tol: float = 1e-8,
+    *,
+    max_iterations: int = 500,
+    time_limit: float = np.inf,
+    change_tol: float | None = None,
+    start: Solution | None = None,
+    progress: Callable[[int, float], None] | None = None,
+    **settings: Any,
+) -> Solution:
+    """Solve an interface problem; the answer's status is `solved` only if its certificate is at most `tol`.
+
+    A problem that has no solution ends `infeasible`, with a proof, where one is found. A backend that fails while solving
+    gives a status, too, with the last iterate.
+
+    Parameters
+    ----------
+    problem : what to solve
+    method : a name (see `contactopt list`) with its `settings`, or a method object; None: `auto`, or `alternating` if the
+        settings name a backend
+    tol : bound on natural_map_residual(problem, reactions, multipliers) [-]
+    max_iterations : of the method
+    time_limit : from the call on [s]; what cannot be interrupted, such as one factorisation, is waited for
+    change_tol : bound of the paper's criterion |r_t - r_t previous| / |r_t| (1e-5 there); None: not used. If it is met
+        first, the iteration ends with status `settled` unless the certificate agrees
+    start : a solution of a problem of the same size, to start from instead of cold
+    progress : called with (iteration, residual) after each outer iteration
+    settings : of a method that is given by its name
+
+    Returns
+    -------
+    Solution : reactions (k, dim) [force], multipliers (p,) [length], status, certificate and history
+
+    Raises
+    ------
+    InputError : on arguments that make no sense, an unknown or missing backend, a method that does not solve the problem's
+        law, or a load that pulls the bodies apart
+    """
+    check_number("tol", tol, low=0.0)
+    check_number("max_iterations", max_iterations, low=0.0)
+    if change_tol is not None:
+        check_number("change_tol", change_tol, low=0.0)
+    if not isinstance(time_limit, (int, float, np.number)) or not time_limit >= 0:
+        raise InputError(f"time_limit must be a number of seconds, at least 0; got {time_limit!r}.")
+    chosen = _method_for(problem, method, settings)
+    with collected() as notes:
+        solution = _run(problem, chosen, tol, max_iterations, time_limit, change_tol, start, progress)
+    return replace(solution, notes=tuple(notes))
+
+
+def _method_for(problem: InterfaceProblem, method: str | Method | None, settings: Mapping[str, Any]) -> Method:
+    """The method object; InputError if it is none, or does not solve the problem's law."""
+    if method is None or isinstance(method, str):
+        method = find_method(method or default_method(settings), **settings)
+    elif not callable(getattr(method, "iterate", None)):
+        raise InputError(f"method must be a name or an object with a function `iterate`; got {method!r}.")
+    elif settings:
+        raise InputError(
+            f"settings {', '.join(settings)} belong to a method given by name; set them on the method object."
+        )
+    if not solves(method, problem.law):
+        raise InputError(
+            f"the method {method!r} does not solve the law {type(problem.law).__name__}; "
+            f"these do: {', '.join(solvers_of(problem.law))}."
+        )
+    return method
+
+
+def _run(
+    problem: InterfaceProblem,
+    method: Method,
+    tol: float,
+    max_iterations: int,
+    time_limit: float,
+    change_tol: float | None,
+    start: Solution | None,
+    progress: Callable[[int, float], None] | None,
+) -> Solution:
+    if problem.contacts == 0:
+        return _without_contacts(problem, method, tol)
+    _check_equilibrium(problem)
+    if not problem.symmetric and not getattr(method, "unsymmetric", False):
+        name = type(method).__name__.lower()
+        raise InputError(
+            f"method '{name}' minimises an energy, which an unsymmetric Q does not have; use auto or proximal."
+        )
+    if not getattr(method, "sparse" if sp.issparse(problem.Q) else "implicit", False):
+        problem = problem.explicit()
+    scaled, scales = dimensionless(problem)
+    recorder = _Recorder(problem, scales, tol, change_tol, max_iterations, time_limit, progress)
+    operator = scaled.Q if isinstance(scaled.Q, InterfaceOperator) else None
+    steps = method.iterate(scaled, None if start is None else _dimensionless_start(start, problem, scales))
+    ended: Status | None = None
+    repeated: Status | None = None
+    message = ""
+    proof, doubt = None, DOUBT
+    while ended is None and proof is None:
+        begin = time.perf_counter()
+        iterate, ended, message = _next(steps, recorder.left(), repeated)
+        recorder.clock += time.perf_counter() - begin
+        repeated = None
+        if iterate is not None:
+            ended = recorder.record(iterate, _counts(operator))
+        if iterate is not None and ended in (Status.STALLED, Status.CYCLING):
+            ended, repeated = None, ended
+        if ended is None and recorder.residual > FAR and recorder.clock > doubt:
+            proof, doubt = infeasibility(problem, recorder.clock / 10), 10 * recorder.clock
+    status = Status.SOLVED if recorder.residual <= tol else ended or Status.INFEASIBLE
+    if proof is None and status is not Status.SOLVED and recorder.residual > CLOSE:
+        proof = infeasibility(problem, float(np.clip(recorder.left(), *PROOF)))
+    if proof is not None:
+        message, status = proof.sentence, Status.INFEASIBLE
+    return Solution(
+        recorder.reactions,
+        recorder.multipliers,
+        status,
+        recorder.residual,
+        len(recorder.history),
+        repr(method),
+        tuple(recorder.history),
+        {"solve": recorder.clock, "certificate": recorder.certified},
+        message or status.sentence,
+        proof=proof,
+        displacements=recorder.displacements,
+    )
+
+
+def _next(
+    steps: Iterator[Iterate | Known], left: float, repeated: Status | None
+) -> tuple[Iterate | Known | None, Status | None, str]:
+    """The next iterate of a method with `left` seconds to go; without one, how the iteration ended and why.
+
+    repeated  how the last iterates repeat earlier ones; a method that does not go on in another way ends so
+    """
+    try:
+        with np.errstate(all="ignore"), until(time.perf_counter() + left):  # what overflows is seen below
+            iterate = next(steps, None) if repeated is None else _turned(steps)
+    except TimeUp:
+        return None, Status.TIME_LIMIT, ""
+    except BackendError as error:
+        return None, Status.BACKEND_FAILED, str(error)
+    except np.linalg.LinAlgError as error:
+        return None, Status.BACKEND_FAILED, f"the method broke down in its linear algebra: {error}"
+    if iterate is None:
+        return None, repeated or Status.SETTLED, ""
+    if not all(np.all(np.isfinite(part)) for part in iterate[:2]):
+        return None, Status.DIVERGED, ""
+    return iterate, None, ""
+
+
+def _turned(steps: Iterator[Iterate | Known]) -> Iterate | Known | None:
+    """The next iterate of a method that was told that it repeats itself; None where it has no other way to go on."""
+    try:
+        return steps.throw(Repeated()) if isinstance(steps, Generator) else None
+    except (Repeated, StopIteration):
+        return None
+
+
+def _counts(operator: InterfaceOperator | None) -> dict[str, float]:
+    """What a method has spent so far: products with Q and, where it works on the bodies themselves, V-cycles."""
+    if operator is None:
+        return {}
+    counts: dict[str, float] = {"products": operator.products}
+    return counts if operator.coupled is None else counts | {"cycles": operator.coupled.cycles}
+
+
+def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> Solution:
+    """No contact: no force. It solves the problem unless a plate needs forces that balance its load."""
+    r, multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
+    residual = natural_map_residual(problem, r, multipliers)
+    status = Status.SOLVED if residual <= tol else Status.SETTLED
+    message = status.sentence if residual <= tol else "there is no contact that could balance the load on the plate"
+    return Solution(r, multipliers, status, residual, 0, repr(method), message=message)
+
+
+def _dimensionless_start(start: Solution, problem: InterfaceProblem, scales: Scales) -> tuple[np.ndarray, np.ndarray]:
+    if not isinstance(start, Solution):
+        raise InputError(f"start must be a Solution; got {type(start).__name__}.")
+    r = real_array("the start's array of reactions", start.reactions)
+    multipliers = real_array("the start's array of multipliers", start.multipliers)
+    if r.shape != problem.q.shape or multipliers.shape != problem.s.shape:
+        raise InputError(
+            f"start has reactions {r.shape} and multipliers {multipliers.shape}; this problem needs "
+            f"{problem.q.shape} and {problem.s.shape}."
+        )
+    return scales.to_dimensionless(r, multipliers)
+
+
+class _Recorder:
+    """Certificate, history and stopping rule of one solve.
+
+    clock counts the method's own seconds, certified those of the certificate.
+    """
+
+    def __init__(self, problem, scales, tol, change_tol, max_iterations, time_limit, progress):  # type: ignore[no-untyped-def]
+        self.began = time.perf_counter()
+        self.problem, self.scales, self.tol, self.change_tol = problem, scales, tol, change_tol
+        self.max_iterations, self.time_limit, self.progress = max_iterations, time_limit, progress
+        self.reactions, self.multipliers = np.zeros(problem.q.shape), np.zeros(len(problem.s))
+        self.displacements: Stacked | None = None
+        self.residual = natural_map_residual(problem, self.reactions, self.multipliers)
+        self.history: list[dict[str, float]] = []
+        self.previous = self.reactions
+        self.recent: list[np.ndarray] = [np.zeros(problem.q.size + len(problem.s))]
+        self.clock, self.certified = 0.0, 0.0
+        self.repeated = 0
+        self.lengthless = not np.any(diagonal(problem.Q)) and not np.any(problem.q)
+
+    def _certificate(self, known: Sequence[Moved]) -> float:
+        """The natural-map residual, by Q r from the method where it is known.
+
+        Where products cost iterations it is computed to a digit as long as it is far from the tolerance.
+        """
+        if known:
+            length = self.scales.length
+            moved = replace(known[0], value=known[0].value * length)
+            X = known[0].displacements
+            self.displacements = None if X is None else X * length
+            return natural_map_residual(self.problem, self.reactions, self.multipliers, moved=moved)
+        self.displacements = None
+        rough = loosened(self.problem.Q, ROUGH)
+        if rough is not self.problem.Q:
+            residual = natural_map_residual(replace(self.problem, Q=rough), self.reactions, self.multipliers)
+            if residual > max(100 * ROUGH, 10 * self.tol):
+                return residual
+        return natural_map_residual(self.problem, self.reactions, self.multipliers)
+
+    @np.errstate(all="ignore")  # numbers beyond the range of floats have no certificate
+    def record(self, iterate: Iterate | Known, counts: dict[str, float]) -> Status | None:
+        """Take one iterate (dimensionless); the status with which the solve ends, or None."""
+        r, lam, *known = iterate
+        self.reactions, self.multipliers = self.scales.to_physical(r, lam)
+        if self.lengthless:
+            # The same forces solve the problem with u = V lambda = 0, and rounding has no length to be small beside.
+            self.multipliers = np.zeros(len(lam))
+        begin = time.perf_counter()
+        self.residual = self._certificate(known)
+        self.certified += time.perf_counter() - begin
+        change = _relative(self.reactions[:, 1:], self.previous[:, 1:])
+        self.previous = self.reactions
+        state = np.concatenate([r.ravel(), lam])
+        repeats = [m for m, old in enumerate(reversed(self.recent), 1) if _relative(state, old) < SAME]
+        self.recent = [*self.recent[1 - CYCLE :], state]
+        self.history.append({"residual": self.residual, "change": change, "seconds": self.clock} | counts)
+        if self.progress is not None:
+            self.progress(len(self.history), self.residual)
+        if self.residual <= self.tol:
+            return Status.SOLVED
+        if self.change_tol is not None and len(self.history) > 1 and change <= self.change_tol:
+            return Status.SETTLED
+        self.repeated = self.repeated + 1 if repeats else 0
+        if self.repeated >= CONFIRM:
+            return Status.STALLED if repeats[0] == 1 else Status.CYCLING
+        if len(self.history) >= self.max_iterations:
+            return Status.ITERATION_LIMIT
+        return Status.TIME_LIMIT if self.left() <= 0 else None
+
+    def left(self) -> float:
+        """Seconds that the time limit leaves."""
+        return self.time_limit - (time.perf_counter() - self.began)
+
+
+def _relative(new: np.ndarray, old: np.ndarray) -> float:
+    size = float(np.linalg.norm(new))
+    return float(np.linalg.norm(new - old)) / size if size > 0 else float(np.linalg.norm(old) > 0)
+
+
+def _check_equilibrium(problem: InterfaceProblem) -> None:
+    """Contact only pushes: InputError for a load that it cannot balance.
+
+    Where the multipliers are known by name, the motion along which the bodies escape is looked for. Otherwise only a plate
+    that moves along the normals and is pulled off is refused.
+    """
+    if problem.motions:
+        found = escape(problem)
+        if found is not None:
+            raise InputError(sentence(problem, found))
+        return
+    if not problem.law.unilateral:
+        return
+    V = problem.V.reshape(problem.contacts, problem.dim, -1)
+    for column, s in zip(np.moveaxis(V, 2, 0), problem.s):
+        size = np.abs(column).max(initial=0.0)
+        push = column[:, 0] * np.sign(s)  # what normal reactions add to s
+        if size > 0 and np.all(np.abs(column[:, 1:]) <= 1e-9 * size) and s != 0 and np.all(push >= -1e-9 * size):
+            raise InputError("the load on the plate pulls the bodies apart: no equilibrium; press them together.")

@@ -1,0 +1,186 @@
+"""Projections that keep the balance of the plates: r = P(y - rho V lambda) with lambda such that V' r + s = 0.
+
+With P the projection on a convex set this is the projection on the set's part where V' r + s = 0, and lambda minimises
+a convex, piecewise smooth function of p unknowns: a few Newton steps with an exact line search, each O(k). It makes every
+first-order method on forces work with plates, without a penalty: lambda is the multiplier that the step itself determines.
+Where the forces are friction alone the function is nearly a sum of lengths, whose minimum is a weighted median: its slope
+jumps from contact to contact, and only the exact search finds the one that sticks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from contactopt.linear.deadline import check_time
+from contactopt.methods.kernels.semismooth import Equations, Projection
+from contactopt.problem.cones import disc_derivative
+from contactopt.problem.laws.law import Law
+
+LEAST_FELT = 1e-8  # share of a motion that closed and sticking contacts must feel to hold it
+DIRECT = 5  # steps of Newton's method that are tried without softened friction
+SURE = 1e-6  # error of the balance, over all friction bounds, with which a motion counts as found
+STEPS = 50  # of Newton's method
+SHARPER = 100.0  # by how much friction grows faster with the slip from one convex problem to the next
+SEARCH = 200  # evaluations of one line search
+EXACT = 1e-13  # relative error of the balance at which the search ends
+CURVATURE = 1e-10  # relative to V'V, added to the Newton matrix: nothing need be in contact at the start
+
+
+def project_balanced(
+    project: Projection,
+    y: np.ndarray,
+    V: np.ndarray,
+    s: np.ndarray,
+    step: np.ndarray | float,
+    multipliers: np.ndarray,
+    steps: int = STEPS,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solve r = P(y - rho V lambda), V' r + s = 0 for r and lambda.
+
+    If no r in the set keeps the balance, the r of the last lambda comes back.
+
+    Parameters
+    ----------
+    project : P and its derivative; P is a projection on a closed convex set that holds zero
+    y : (k, d) the point that is projected
+    V, s : (k d, p) rigid motions and (p,) resultants
+    step : rho, greater than 0: one number or one per contact (k,)
+    multipliers : (p,) where lambda starts
+    steps : of Newton's method at most
+
+    Returns
+    -------
+    r (k, d) and lambda (p,)
+    """
+    lam = multipliers
+    if len(s) == 0:
+        return project(y)[0], lam
+    k, d = y.shape
+    rho = np.broadcast_to(np.asarray(step, dtype=float), (k,))[:, None]
+    size = np.abs(s) + np.abs(V).sum(axis=0) * 1e-3
+    ridge = CURVATURE * np.diag(np.sum(rho[:, :, None] * V.reshape(k, d, -1) ** 2, axis=(0, 1)))
+    z = y - rho * (V @ lam).reshape(k, d)
+    for _ in range(steps):
+        check_time()
+        P, D = project(z)
+        error = V.T @ P.ravel() + s
+        if np.all(np.abs(error) <= EXACT * size):
+            break
+        # lambda minimises a convex function with the gradient -(V'P + s) and the second derivative V' rho D V.
+        DV = np.einsum("kab,kbp->kap", rho[:, :, None] * D, V.reshape(k, d, -1)).reshape(V.shape)
+        move = np.linalg.solve(V.T @ DV + ridge, error)
+        way = (V @ move).reshape(k, d)
+
+        def slope(t: float, z: np.ndarray = z, way: np.ndarray = way, work: float = float(s @ move)) -> float:
+            return -float(np.sum(way * project(z - t * rho * way)[0])) - work
+
+        length = _least(slope, -float(error @ move))
+        if length == 0.0:
+            break
+        lam, z = lam + length * move, z - length * rho * way
+    return P, lam
+
+
+def _least(slope: Callable[[float], float], first: float) -> float:
+    """The t > 0 at which a slope that grows from `first` < 0 vanishes; 0 if it does not, or not above rounding."""
+    low, high, below, above, t = 0.0, np.inf, first, np.inf, 1.0
+    for trial in range(SEARCH):
+        value = slope(t)
+        if abs(value) <= 0.1 * abs(first):
+            return t
+        if value < 0:
+            low, below = t, value
+        else:
+            high, above = t, value
+        if high == np.inf:
+            t = 4 * low
+        elif low == 0.0:
+            t = high / 16
+        else:
+            # The secant is exact inside a piece without jumps; halving halts at a jump.
+            t = low - below * (high - low) / (above - below) if trial % 2 else np.sqrt(low * high)
+            if not low < t < high or high - low <= 4 * np.finfo(float).eps * high:
+                return high
+    return 0.0 if high == np.inf else high
+
+
+def loose_motions(V: np.ndarray, D: np.ndarray) -> np.ndarray:
+    """Find the motions that no closed contact holds along its normal and no sticking one at all.
+
+    Parameters
+    ----------
+    V
+        (k d, p) rigid motions.
+    D
+        (k, d, d) derivative of the law's map.
+
+    Returns
+    -------
+    ndarray
+        (p, j) orthonormal columns, combinations of the multipliers.
+    """
+    d = D.shape[1]
+    firm = np.repeat(np.all(np.eye(d) == D, axis=(1, 2))[:, None], d, axis=1)
+    firm[:, 0] = np.any(D != 0, axis=(1, 2))
+    felt = V[firm.ravel()]
+    values, motions = np.linalg.eigh(felt.T @ felt)
+    return np.asarray(motions[:, values <= LEAST_FELT * max(values.max(initial=0.0), 1.0)])
+
+
+def settled(equations: Equations, law: Law, r: np.ndarray, u: np.ndarray, loose: np.ndarray) -> np.ndarray | None:
+    """Find the change of the multipliers with which friction balances motions that no contact holds.
+
+    Newton's method linearises the contacts. Where all of them slip, their forces do not change with such a motion, and its
+    system says nothing about it: it is singular, or its steps jump to and fro over the contact that should stick. Here the
+    normal forces are bounds of the friction, and the motion follows from a convex problem.
+
+    Parameters
+    ----------
+    equations
+        The equations of contact and friction.
+    law
+        Their law.
+    r, u
+        (k, d) forces and displacements.
+    loose
+        (p, j) the motions, as `loose_motions` finds them.
+
+    Returns
+    -------
+    ndarray or None
+        The change (p,); None if no friction balances the loads.
+    """
+    k, d = r.shape
+    y = r - equations.rho[:, None] * u
+    normal = np.maximum(y[:, 0], law.lowest)
+    bound, W = law.bound(normal), (equations.V @ loose).reshape(k, d, -1)
+    s = loose.T @ equations.s + normal @ W[:, 0]
+    slide = bound > 0
+    if not slide.any():
+        return None
+    t, bound, rho, W = y[slide, 1:], bound[slide], equations.rho[slide], W[slide, 1:].reshape(-1, W.shape[2])
+
+    def balanced(moved: np.ndarray, share: float, steps: int = STEPS) -> tuple[np.ndarray, bool]:
+        P, moved = project_balanced(_softened(bound, share), t, W, s, rho, moved, steps)
+        return moved, bool(np.linalg.norm(W.T @ P.ravel() + s) <= SURE * bound.sum())
+
+    moved, found = balanced(np.zeros(len(s)), 1.0, DIRECT)
+    if not found:  # far away the friction must soften first
+        share = float(np.min(bound / np.maximum(np.linalg.norm(t, axis=1), bound), initial=1.0))
+        moved = np.zeros(len(s))
+        while share < 1.0:
+            moved, share = balanced(moved, share)[0], SHARPER * share
+        moved, found = balanced(moved, 1.0)
+    return loose @ moved if found else None
+
+
+def _softened(bound: np.ndarray, share: float) -> Projection:
+    """y -> the projection of share y on discs, and its derivative: friction that grows gradually with the slip."""
+
+    def project(y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        P, D = disc_derivative(share * y, bound)
+        return P, share * D
+
+    return project

@@ -1,0 +1,275 @@
+"""Newton's steps on the contact equations and the equilibrium of the bodies at once: no solve inside a solve.
+
+The unknowns are the displacements X of the bodies, the contact forces r and the multipliers lambda. With Q = T A^-1 T' + R
+(contactopt.linear.saddle_point) one step of Newton's method on r = P(r - rho (T X + R r + V lambda + q)) is
+
+    A dX - T' dr = T' r - A X
+    (I - D + D rho R) dr + D rho (T dX + V dlambda) = error,   V' dr = -balance.
+
+Flexible GMRES solves it to the accuracy that the step is worth. Its preconditioner is block triangular: the Schur complement
+for a model of Q gives (dr, dlambda), then one V-cycle per body gives dX for the right side T' dr and the rest. The
+displacements are carried from step to step, so that equilibrium becomes as accurate as the contact equations.
+
+Source of the preconditioner: Bramble, Pasciak (1988), A preconditioning technique for indefinite systems; Murphy, Golub,
+Wathen (2000), A note on preconditioning for indefinite linear systems.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from contactopt.linear.deadline import check_time
+from contactopt.linear.flexible_gmres import flexible_gmres
+from contactopt.linear.saddle_point import CoupledForm
+from contactopt.linear.stacked import Stacked, norm
+from contactopt.linear.threads import one_blas_thread
+from contactopt.methods.constants import (
+    COUPLED_FIRST,
+    COUPLED_LOOSEST,
+    COUPLED_TIGHTEST,
+    GIVEN_BALANCE,
+    SCHUR_MARGIN,
+    SCHUR_STEP,
+)
+from contactopt.methods.kernels.alart_curnier import (
+    admissible,
+    coulomb_equations,
+    glued_contacts,
+    glued_projection,
+)
+from contactopt.methods.kernels.balance import loose_motions, settled
+from contactopt.methods.kernels.krylov import model_of
+from contactopt.methods.kernels.linearised import Linearised
+from contactopt.methods.kernels.semismooth import Equations
+from contactopt.methods.preconditioners import Preconditioner
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.certificate import Moved
+
+MOST_ITERATIONS = 60  # conjugate gradient iterations towards it
+
+Known = tuple[np.ndarray, np.ndarray, Moved]  # reactions (k, dim), multipliers (p,) and Q r
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Displacements X of the bodies, contact forces r (k, d) and multipliers (p,)."""
+
+    X: Stacked
+    r: np.ndarray
+    multipliers: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Coupled:
+    """The equations of one problem, its form before condensation and a model of Q."""
+
+    equations: Equations
+    form: CoupledForm
+    P: Preconditioner
+
+    @cached_property
+    def weights(self) -> Stacked:
+        """Weights of the residuals of X, r and the balance: in units of the root of an energy, whatever the mesh."""
+        r = np.repeat(self.equations.rho**-0.5, self.equations.q.shape[1])
+        return _joined(self.form.diagonal() ** -0.5, r, np.ones(len(self.equations.s)))
+
+    def moved(self, at: State) -> np.ndarray:
+        """The relative displacements u (k, d)."""
+        u = self.form.moved(at.X, at.r.ravel()) + self.equations.V @ at.multipliers
+        return np.asarray(u.reshape(at.r.shape) + self.equations.q)
+
+    def linearised(self, at: State) -> tuple[Stacked, Linearised]:
+        """The right side of Newton's step there, in parts for X, r and the balance, and its contact equations."""
+        equations = self.equations
+        P, D = equations.project(at.r - equations.rho[:, None] * self.moved(at))
+        balance = equations.V.T @ at.r.ravel() + equations.s
+        forces = self.form.unbalanced(at.X, at.r.ravel())
+        return _joined(forces, (P - at.r).ravel(), -balance), Linearised(equations, D)
+
+    def size(self, right: Stacked) -> float:
+        """The residual that belongs to a right side."""
+        return norm(self.weights * right)
+
+    def step(self, at: State, right: Stacked, linearised: Linearised, rtol: float) -> State | None:
+        """The state after Newton's step, or None if its linear system could not be solved."""
+        form, V = self.form, self.equations.V
+        inverse = linearised.rough(self.P)
+        model = (lambda x: self.P @ x) if self.P.model is None else self.P.model.matvec
+
+        def product(x: Stacked) -> Stacked:
+            X, r, multipliers = _parted(x)
+            forces = form.stiffness(X) - form.pulled(r)
+            moved = form.moved(X, r) + V @ multipliers
+            return _joined(forces, linearised.rows(r, moved), V.T @ r)
+
+        def precondition(x: Stacked) -> Stacked:
+            forces, error, balance = _parted(x)
+            r, multipliers = linearised.solve(model, inverse, error, -balance, SCHUR_STEP)
+            return _joined(form.approximate(forces + form.pulled(r)), r, multipliers)
+
+        change = flexible_gmres(product, precondition, right, self.weights, rtol)
+        if not np.isfinite(norm(change)):
+            return None
+        X, r, multipliers = _parted(change)
+        return State(at.X + X, at.r + r.reshape(at.r.shape), at.multipliers + multipliers)
+
+    def judged(self, at: State, error: np.ndarray) -> Known:
+        """The forces r + error, at the solution equal to r and within the bounds to the last digit, with what Q makes of them.
+
+        One V-cycle improves the displacements. The accuracy stated is that before it, by the criterion with which
+        conjugate gradients end: the energy (f'Bf)^1/2 of the missing forces f over that of the displacements.
+        """
+        form, r = self.form, at.r + error
+        missing = form.unbalanced(at.X, r.ravel())
+        correction = form.approximate(missing)
+        energy = at.X.dot(form.pulled(r.ravel()) - missing)
+        lacking = missing.dot(correction)
+        accuracy = np.sqrt(lacking / energy) if energy > 0 else (np.inf if lacking else 0.0)
+        better = at.X + correction
+        return r, at.multipliers, Moved(form.moved(better, r.ravel()), float(accuracy), better)
+
+
+def coupled_steps(
+    problem: InterfaceProblem,
+    form: CoupledForm,
+    preconditioner: str | None,
+    start: tuple[np.ndarray, np.ndarray] | None,
+) -> Iterator[tuple[Known, float]]:
+    """Iterate Newton's method on the contact equations and the equilibrium of the bodies at once.
+
+    Parameters
+    ----------
+    problem
+        A dimensionless interface problem.
+    form
+        Its Q before condensation.
+    preconditioner
+        A name, as for `model_of`.
+    start
+        Forces (k, dim) and multipliers (p,) to start from; None: the bonded solution.
+
+    Yields
+    ------
+    tuple
+        An iterate, and the residual of the equations that its step began with. The iteration ends where a step fails.
+    """
+    with one_blas_thread():
+        several = len(problem.pairs) > 1
+        P = model_of(problem, preconditioner, deflate=several)
+        equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
+        coupled = Coupled(equations, form, P if several else fitted(P, form))
+        at = _bonded(problem, coupled) if start is None else State(in_equilibrium(form, start[0]), *start)
+    last = np.inf
+    while at is not None:
+        with one_blas_thread():
+            right, linearised = coupled.linearised(at)
+            loose = loose_motions(problem.V, linearised.D)
+            change = settled(equations, problem.law, at.r, coupled.moved(at), loose) if loose.size else None
+            if change is not None:
+                at = replace(at, multipliers=at.multipliers + change)
+                right, linearised = coupled.linearised(at)
+            residual = coupled.size(right)
+            error = _parted(right)[1].reshape(at.r.shape)
+            known = coupled.judged(at, admissible(problem, at.r, error) - at.r)
+        yield known, residual
+        rtol = (
+            min(COUPLED_LOOSEST, max(COUPLED_TIGHTEST, 0.5 * (residual / last) ** 2))
+            if np.isfinite(last)
+            else COUPLED_FIRST
+        )
+        with one_blas_thread():
+            at, last = coupled.step(at, right, linearised, rtol), residual
+
+
+def _bonded(problem: InterfaceProblem, coupled: Coupled) -> State | None:
+    """The bonded solution of contactopt.methods.kernels.alart_curnier.cold_start, to COUPLED_FIRST, or no force at all."""
+    none = np.zeros(problem.q.shape)
+    zero = State(coupled.form.pulled(none.ravel()), none, np.zeros(len(problem.s)))
+    glued = glued_contacts(problem)
+    if not glued.any():
+        return zero
+    glue = Coupled(glued_projection(coupled.equations, glued), coupled.form, coupled.P)
+    right, linearised = glue.linearised(zero)
+    bonded = glue.step(zero, right, linearised, COUPLED_FIRST)
+    if bonded is None or len(problem.s):
+        return bonded or zero
+    return min(zero, bonded, key=lambda state: coupled.size(coupled.linearised(state)[0]))
+
+
+def fitted(P: Preconditioner, form: CoupledForm) -> Preconditioner:
+    """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / SCHUR_MARGIN where a random force does most of
+    its work.
+
+    One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur complement that is rather
+    too large than too small.
+
+    Parameters
+    ----------
+    P
+        The preconditioner, with its model of Q if it has one.
+    form
+        Q before condensation.
+
+    Returns
+    -------
+    Preconditioner
+        P and its model, scaled.
+    """
+    # The mean eigenvalue of P Q, weighted with the work of a random force x: (Qx)' P (Qx) over x' Qx.
+    x = np.random.default_rng(0).normal(size=P.shape[0])
+    Qx = form.moved(form.approximate(form.pulled(x)), x)
+    factor, model = float(x @ Qx) / float(Qx @ (P @ Qx)) / SCHUR_MARGIN, P.model
+    stiff = None if model is None else lambda y: model @ y / factor
+    return Preconditioner(P.shape[0], lambda y: factor * (P @ y), stiff)
+
+
+def in_equilibrium(form: CoupledForm, r: np.ndarray, rtol: float = GIVEN_BALANCE) -> Stacked:
+    """Compute displacements close to A^-1 T' r, by conjugate gradients with V-cycles.
+
+    Parameters
+    ----------
+    form
+        Q before condensation.
+    r
+        (k, dim) contact forces.
+    rtol
+        Relative accuracy in the energy norm.
+
+    Returns
+    -------
+    Stacked
+        Displacements X of the bodies.
+    """
+    # Conjugate gradients on A X = T' r with B, one V-cycle, as preconditioner; `size` is the energy residual' B
+    # residual.
+    residual = form.pulled(r.ravel())
+    X, size, goal = 0.0 * residual, 1.0, 0.0
+    p = X
+    for step in range(MOST_ITERATIONS):
+        check_time()
+        z = form.approximate(residual)
+        size, previous = residual.dot(z), size
+        goal = goal if step else rtol**2 * size
+        if not size > goal:
+            break
+        p = z + (size / previous if step else 0.0) * p
+        Ap = form.stiffness(p)
+        alpha = size / p.dot(Ap)
+        X = X + alpha * p
+        residual = residual - alpha * Ap
+    return X
+
+
+def _joined(X: Stacked, r: np.ndarray, multipliers: np.ndarray) -> Stacked:
+    """One vector of the parts of X, of r (k d,) and of multipliers (p,)."""
+    return Stacked((*X.parts, r, multipliers))
+
+
+def _parted(x: Stacked) -> tuple[Stacked, np.ndarray, np.ndarray]:
+    """X, r and the multipliers of a joined vector."""
+    *X, r, multipliers = x.parts
+    return Stacked(tuple(X)), r, multipliers

@@ -1,0 +1,174 @@
+"""Newton steps from products with Q alone: PCG and GMRES preconditioned by the same step for a model of Q.
+
+A step solves  (I - D + D rho Q) dr + D rho V dlambda = error,  V' dr = -balance  (contactopt.methods.kernels.semismooth). Where D is
+symmetric (all contacts glued, the normal problem, Tresca friction) let U diag(delta) U' = D with delta > 0. Then
+
+    dr = U alpha + dr0,   dr0 = (I - U U') error,   (U'QU + B) alpha + U'V dlambda = U'error / (delta rho) - U'Q dr0,
+
+B = (1 - delta) / (delta rho), symmetric positive definite on the balance V'U alpha = -balance - V'dr0: projected PCG
+(Gould, Hribar, Nocedal 2001). Coulomb's D is not symmetric: GMRES. In both the preconditioner is the same system with Q
+replaced by its model G, whose products cost an FFT, solved by an inner iteration: if c1 G <= Q <= c2 G then the
+preconditioned system is that well conditioned whatever sticks, slips or is open. Q is needed once per iteration.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import LinearOperator, cg
+
+from contactopt.errors import InputError
+from contactopt.linear.operators import loosened
+from contactopt.methods.constants import MODEL_PRODUCTS, MODEL_STEP, PRODUCT_SHARE
+from contactopt.methods.kernels.linearised import CYCLES, RESTART, Linearised
+from contactopt.methods.kernels.semismooth import Equations
+from contactopt.methods.notes import note
+from contactopt.methods.preconditioners import Preconditioner, deflated, preconditioner, restricted, smooth_motions
+from contactopt.problem import InterfaceProblem
+
+logger = logging.getLogger(__name__)
+
+FLAT = 1e-8  # eigenvalues of D below this are zero
+
+Step = tuple[np.ndarray, np.ndarray]  # dr (k, d), dlambda (p,)
+
+
+def model_of(problem: InterfaceProblem, name: str | None = None, deflate: bool = True) -> Preconditioner:
+    """Make the preconditioner of a problem, with the smooth motions deflated if asked for.
+
+    Parameters
+    ----------
+    problem
+        The interface problem.
+    name
+        A name in PRECONDITIONERS, or 'none' for the identity. By default `neumann` where the contacts lie on a grid,
+        `laplacian` on other surfaces whose cells are known, else the identity, with a note that says why.
+    deflate
+        Whether the smooth motions of the bodies are solved for exactly, which costs a few products with Q.
+
+    Returns
+    -------
+    Preconditioner
+        An approximate inverse of Q, on arrays (k dim,).
+
+    Raises
+    ------
+    InputError
+        If the preconditioner that was named is unknown or does not fit the contacts.
+    """
+    missing: list[str] = []
+    for choice in ("neumann", "laplacian") if name is None else (name,) * (name != "none"):
+        try:
+            P = preconditioner(problem, choice)
+            return deflated(P, loosened(problem.Q, MODEL_PRODUCTS), smooth_motions(problem)) if deflate else P
+        except InputError as error:
+            if name is not None:
+                raise
+            missing.append(str(error))
+    if missing:
+        note(logger, f"no preconditioner fits these contacts, so iterative steps go without one: {' '.join(missing)}")
+    return Preconditioner(problem.q.size, lambda x: x)
+
+
+def krylov_step(
+    equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
+) -> Step | None:
+    """Solve for a Newton step from products with Q alone.
+
+    Parameters
+    ----------
+    equations
+        The equations of contact and friction at k contacts in d components.
+    P
+        The preconditioner.
+    error
+        (k, d) right-hand side of the contact equations.
+    balance
+        (p,) error of the balance.
+    D
+        (k, d, d) derivatives of the law's map.
+    rtol
+        Relative accuracy of the step.
+
+    Returns
+    -------
+    tuple or None
+        dr (k, d) and dlambda (p,); None if the iteration does not get anywhere.
+    """
+    symmetric = np.array_equal(D, D.transpose(0, 2, 1))
+    solve = _symmetric_step if symmetric else _unsymmetric_step
+    dr, multipliers = solve(equations, P, error, balance, D, rtol)
+    if not (np.all(np.isfinite(dr)) and np.all(np.isfinite(multipliers))):
+        return None
+    return dr, multipliers
+
+
+def _symmetric_step(
+    equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
+) -> Step:
+    Q, V = loosened(equations.Q, PRODUCT_SHARE * rtol), equations.V
+    # The unknowns alpha are the amounts of the directions U in which a contact may still change its force.
+    U, delta, rho = _directions(D, equations.rho)
+    # B of the module's head; a proximal subproblem adds its weight to Q.
+    added = (1 - delta) / (delta * rho) + equations.weight
+    # dr0, the part of the step outside these directions, is known at once.
+    known = error.ravel() - U @ (U.T @ error.ravel())
+    right = (U.T @ error.ravel()) / (delta * rho)
+    if np.any(known):
+        right -= U.T @ (Q @ known)
+    # In these directions the balance reads W' alpha = b.
+    W, b = U.T @ V, -balance - V.T @ known
+    m = len(delta)
+    if m == 0:
+        return known.reshape(error.shape), np.zeros(len(balance))
+    # N, an approximate inverse of the system U'QU + B, and Y = N W, K = (W'N W)^-1. They make two projections:
+    near = restricted(P, U, added)
+    Y = np.stack([near @ w for w in W.T], axis=1) if W.shape[1] else W
+    K = np.linalg.pinv(W.T @ Y)
+
+    def off(x: np.ndarray) -> np.ndarray:  # I - Y K W', onto the alpha that do not change the balance, W' alpha = 0
+        return x - Y @ (K @ (W.T @ x))
+
+    def off_t(x: np.ndarray) -> np.ndarray:  # its transpose I - W K Y', which removes multipliers from a residual
+        return x - W @ (K @ (Y.T @ x))
+
+    def product(x: np.ndarray) -> np.ndarray:
+        return U.T @ (Q @ (U @ x)) + added * x
+
+    # Start at an alpha that has the balance; all corrections then keep it.
+    start = Y @ (K @ b)
+    residual = right - product(start) if np.any(start) else right
+    system = LinearOperator((m, m), matvec=lambda x: off_t(product(off(x.ravel()))), dtype=float)
+    inverse = LinearOperator((m, m), matvec=lambda x: off(near @ off_t(x.ravel())), dtype=float)
+    size = max(np.linalg.norm(off_t(right)), np.linalg.norm(off_t(residual)))
+    # The residual is compared with the right side without multipliers, or with the first residual if that is larger.
+    beta, _ = cg(system, off_t(residual), rtol=0.0, atol=rtol * size, M=inverse, maxiter=RESTART * CYCLES)
+    alpha = start + off(beta)
+    # The multipliers are what is left of the residual, which lies in the range of W.
+    multipliers = K @ (Y.T @ (right - product(alpha))) if len(b) else b
+    return (known + U @ alpha).reshape(error.shape), multipliers
+
+
+def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:
+    """U (k d, m) with the eigenvectors of all D whose eigenvalues delta (m,) are positive, and rho (m,) of each."""
+    k, d = D.shape[:2]
+    # The eigenvectors of each contact's D become columns of U, which touch the rows of that contact only.
+    values, vectors = np.linalg.eigh(D)
+    contact, which = np.nonzero(values > FLAT)
+    columns = vectors[contact, :, which]  # (m, d)
+    rows = (contact[:, None] * d + np.arange(d)).ravel()
+    m = len(contact)
+    U = sp.csr_matrix((columns.ravel(), (rows, np.repeat(np.arange(m), d))), (k * d, m))
+    U.eliminate_zeros()
+    return U, values[contact, which], rho[contact]
+
+
+def _unsymmetric_step(
+    equations: Equations, P: Preconditioner, error: np.ndarray, balance: np.ndarray, D: np.ndarray, rtol: float
+) -> Step:
+    Q, linearised = loosened(equations.Q, PRODUCT_SHARE * rtol), Linearised(equations, D)
+    inverse = linearised.inverse(P, MODEL_STEP * rtol)
+    dr, multipliers = linearised.solve(lambda x: Q @ x, inverse, error.ravel(), balance, rtol)
+    return dr.reshape(error.shape), multipliers

@@ -1,0 +1,115 @@
+"""The linear system of one Newton step with an unsymmetric derivative, and its inverse for a model of Q.
+
+    (I - D + D rho Q) dr + D rho V dlambda = error,   V' dr = -balance         (contactopt.methods.kernels.semismooth)
+
+Contacts with D = 0 are open: their dr is known, and they leave the system.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from contactopt.methods.constants import SLIPPING
+from contactopt.methods.kernels.semismooth import Equations
+from contactopt.methods.preconditioners import Preconditioner
+
+RESTART, CYCLES = 60, 3  # of GMRES
+UNFELT = 1e-12  # share of the largest force that a motion makes, below which it makes none
+
+Act = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """One Newton step's system: the equations and the derivative D (k, d, d) of the projection."""
+
+    equations: Equations
+    D: np.ndarray
+
+    @cached_property
+    def closed(self) -> np.ndarray:
+        """Unknowns of the contacts that are not open (n,)."""
+        return np.flatnonzero(np.repeat(np.any(self.D != 0, axis=(1, 2)), self.D.shape[1]))
+
+    def rows(self, dr: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        """dr - D (dr - rho (moved + weight dr)) (k d,): the left sides of all contacts that move by `moved` under dr."""
+        k, d = self.D.shape[:2]
+        shift = moved + self.equations.weight * dr
+        inner = dr.reshape(k, d) - self.equations.rho[:, None] * shift.reshape(k, d)
+        return (dr.reshape(k, d) - np.einsum("kab,kb->ka", self.D, inner)).ravel()
+
+    def system(self, product: Act) -> Act:
+        """The left sides (n + p,) of closed contacts and balance, for the products with Q or its model."""
+        n, V = len(self.closed), self.equations.V
+
+        def act(x: np.ndarray) -> np.ndarray:
+            dr = np.zeros(len(V))
+            dr[self.closed] = x[:n]
+            return np.concatenate([self.rows(dr, product(dr) + V @ x[n:])[self.closed], V.T @ dr])
+
+        return act
+
+    def solve(
+        self, product: Act, inverse: LinearOperator, error: np.ndarray, balance: np.ndarray, rtol: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """dr (k d,) and dlambda (p,) for the right sides error (k d,) and -balance, by GMRES."""
+        closed, V = self.closed, self.equations.V
+        n, known = len(closed), error.copy()
+        known[closed] = 0.0
+        right = np.concatenate([error[closed], -balance - V.T @ known])
+        if np.any(known):
+            right[:n] -= self.rows(known, product(known))[closed]
+        x = _gmres(self.operator(product), right, rtol, inverse)
+        known[closed] = x[:n]
+        return known, x[n:]
+
+    def operator(self, product: Act) -> LinearOperator:
+        size = len(self.closed) + self.equations.V.shape[1]
+        return LinearOperator((size, size), matvec=self.system(product), dtype=float)
+
+    def inverse(self, P: Preconditioner, rtol: float) -> LinearOperator:
+        """The inverse of the system with Q replaced by the model of P, to that accuracy; `rough` without a model."""
+        rough = self.rough(P)
+        if P.model is None:
+            return rough
+        model = self.operator(P.model.matvec)
+        return LinearOperator(rough.shape, matvec=lambda x: _gmres(model, x.ravel(), rtol, rough), dtype=float)
+
+    def rough(self, P: Preconditioner) -> LinearOperator:
+        """P where a component is held by contact, the identity where it slips, bordered by the balance."""
+        closed, d = self.closed, self.D.shape[1]
+        rho, V = np.repeat(self.equations.rho, d)[closed], self.equations.V[closed]
+        n, p = V.shape
+        inside = np.diagonal(self.D, axis1=1, axis2=2).ravel()[closed] > SLIPPING
+        unknowns = closed[inside]
+
+        def apply(x: np.ndarray) -> np.ndarray:
+            y = x.copy()
+            full = np.zeros(P.shape[0])
+            full[unknowns] = x[inside] / rho[inside]
+            y[inside] = (P @ full)[unknowns]
+            return y
+
+        # The border of the balance: K is the inverse of V' N (D rho V), the Schur complement for the rough inverse N.
+        # Motions that no contact feels stay out of it.
+        shifts = (rho[:, None] * V).reshape(n // d, d, p)
+        border = (self.D[np.any(self.D != 0, axis=(1, 2))] @ shifts).reshape(n, p)
+        Y = np.stack([apply(v) for v in border.T], axis=1) if p else V
+        K = np.linalg.pinv(V.T @ Y, rcond=UNFELT)
+
+        def solve(x: np.ndarray) -> np.ndarray:
+            # First without multipliers, then the multipliers that restore the balance, then their share of dr.
+            y = apply(x[:n])
+            multipliers = K @ (V.T @ y - x[n:])
+            return np.concatenate([y - Y @ multipliers, multipliers])
+
+        return LinearOperator((n + p, n + p), matvec=lambda x: solve(x.ravel()), dtype=float)
+
+
+def _gmres(A: LinearOperator, b: np.ndarray, rtol: float, M: LinearOperator) -> np.ndarray:
+    return np.asarray(gmres(A, b, rtol=rtol, restart=min(len(b), RESTART), maxiter=CYCLES, M=M)[0])

@@ -1,0 +1,203 @@
+"""Linear systems of block form: diag(left) Q + diag(added), both block diagonal, with Q an array or sparse.
+
+Newton's method and interior-point methods for contact solve many of them that differ in the d x d blocks of the contacts
+only. For a sparse Q the pattern of its blocks, the order of elimination and the places of its entries in compressed
+columns are found once; a system then costs a few array operations and one sparse LU factorisation (SuperLU). Memory is
+linear in the non-zeros of the factors.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from contactopt.linear.operators import Interface
+from contactopt.methods.constants import FULL, SMALL
+
+PIVOT = 0.01  # a diagonal entry this much smaller than the largest of its column is still a pivot
+
+
+@dataclass(frozen=True)
+class Solver:
+    """A factorised block system.
+
+    apply  right-hand sides (m, j) -> x (m, j)
+    sign   -> sign of the determinant, 1 or -1
+    """
+
+    apply: Callable[[np.ndarray], np.ndarray]
+    sign: Callable[[], float]
+
+    def __call__(self, right: np.ndarray) -> np.ndarray:
+        return self.apply(right)
+
+
+class DenseBlocks:
+    """Q (n, n) as an array, blocks of d."""
+
+    def __init__(self, Q: np.ndarray, d: int):
+        self.Q, self.d = Q, d
+
+    def factor(self, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray) -> Solver | None:
+        """Solver of the rows and columns `kept` (n,) of diag(left) Q + diag(added); left, added (k, d, d); None if singular.
+
+        left None stands for the identity.
+        """
+        k, d = len(added), self.d
+        A = self.Q.copy() if left is None else (left @ self.Q.reshape(k, d, k * d)).reshape(k * d, k * d)
+        diagonal = np.arange(k)
+        A.reshape(k, d, k, d)[diagonal, :, diagonal, :] += added
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", la.LinAlgWarning)  # a bad step is seen by its residual
+            try:
+                factors = la.lu_factor(A if kept.all() else A[np.ix_(kept, kept)], overwrite_a=True, check_finite=False)
+            except (la.LinAlgError, ValueError):
+                return None
+        lu, swapped = factors
+
+        def sign() -> float:
+            swaps = np.count_nonzero(swapped != np.arange(len(lu)))
+            return float(np.prod(np.sign(np.diagonal(lu))) * (-1.0) ** swaps)
+
+        return Solver(lambda right: np.asarray(la.lu_solve(factors, right, check_finite=False)), sign)
+
+
+class SparseBlocks:
+    """Q (n, n) by its d x d blocks, with the places of their entries in the columns of an LU factorisation.
+
+    rows, columns  (b,) contacts that each block couples, ordered by rows; every diagonal block is there
+    blocks         (b, d, d)
+    home           (k,) index of each contact's diagonal block
+    """
+
+    def __init__(self, Q: sp.csr_array, d: int):
+        self.Q, self.d, self.k = Q, d, Q.shape[0] // d
+        # Every entry belongs to the block of its row's and its column's contact. Blocks are numbered row by row, and
+        # every diagonal block is there, because something will be added to it.
+        entries = sp.coo_array(Q)
+        i, j = (index.astype(np.int64) for index in entries.coords)
+        own = np.arange(self.k)
+        keys = np.concatenate([(i // d) * self.k + j // d, own * self.k + own])
+        unique, where = np.unique(keys, return_inverse=True)
+        self.rows, self.columns = unique // self.k, unique % self.k
+        self.blocks = np.zeros((len(unique), d, d))
+        self.blocks[where[: len(i)], i % d, j % d] = entries.data
+        self.home = where[len(i) :]
+        self.unknown, self.order, self.row, self.column = self._arranged()
+
+    def _arranged(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """The unknowns in an order of elimination of least degree, and the entries by compressed columns of that order."""
+        d, n = self.d, self.d * self.k
+        # SuperLU finds the order on a matrix of the same pattern with so large a diagonal that nothing is pivoted.
+        size = float(np.abs(self.Q.data).max(initial=0.0)) or 1.0
+        safe = sp.csc_array(abs(self.Q) + sp.diags_array(np.full(n, 2 * size * self.k)))  # pivots are on the diagonal
+        place = splu(safe, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).perm_c
+        # Row and column of every entry of every block in that order, sorted as compressed columns want them.
+        local = np.arange(d)
+        row = place[np.broadcast_to((self.rows[:, None] * d + local)[:, :, None], self.blocks.shape)].ravel()
+        column = place[np.broadcast_to((self.columns[:, None] * d + local)[:, None, :], self.blocks.shape)].ravel()
+        order = np.lexsort((row, column))
+        return np.argsort(place), order, row[order], column[order]
+
+    def factor(self, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray) -> Solver | None:
+        """As DenseBlocks.factor."""
+        blocks = self.blocks.copy() if left is None else left[self.rows] @ self.blocks
+        blocks[self.home] += added
+        # Take the entries by columns, and leave out the unknowns that are not kept.
+        values, row, column = blocks.ravel()[self.order], self.row, self.column
+        stays = kept[self.unknown]  # in the order of elimination
+        m = int(stays.sum())
+        if m < len(stays):
+            inside = stays[row] & stays[column]
+            new = np.cumsum(stays) - 1
+            values, row, column = values[inside], new[row[inside]], new[column[inside]]
+        ends = np.concatenate([[0], np.cumsum(np.bincount(column, minlength=m))])
+        matrix = sp.csc_array((values, row.astype(np.int32), ends.astype(np.int32)), shape=(m, m))
+        try:
+            factors = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=PIVOT, options={"SymmetricMode": True})
+        except (RuntimeError, ValueError):
+            return None
+        index = (np.cumsum(kept) - 1)[self.unknown[stays]]  # places in the right-hand side
+
+        def solve(right: np.ndarray) -> np.ndarray:
+            x = np.empty_like(right)
+            x[index] = factors.solve(np.ascontiguousarray(right[index]))
+            return x
+
+        def sign() -> float:
+            pivots = float(np.prod(np.sign(factors.U.diagonal())))
+            return pivots * _parity(factors.perm_r) * _parity(factors.perm_c)
+
+        return Solver(solve, sign)
+
+
+Blocks = DenseBlocks | SparseBlocks
+
+
+def _parity(order: np.ndarray) -> int:
+    """1 for an even permutation, -1 for an odd one: by its cycles."""
+    n = len(order)
+    cycles = connected_components(sp.csr_array((np.ones(n), (np.arange(n), order)), shape=(n, n)))[0]
+    return -1 if (n - cycles) % 2 else 1
+
+
+def block_matrix(Q: Interface, d: int) -> Blocks:
+    """Prepare Q for block systems: sparse where that is faster than LAPACK on an array.
+
+    Parameters
+    ----------
+    Q
+        (n, n) an array or sparse.
+    d
+        Number of components of a contact.
+
+    Returns
+    -------
+    Blocks
+        The matrix, which solves with other diagonal blocks added.
+    """
+    if not sp.issparse(Q):
+        return DenseBlocks(Q, d)
+    n = Q.shape[0]
+    return DenseBlocks(Q.toarray(), d) if n <= SMALL or Q.nnz > FULL * n * n else SparseBlocks(Q, d)
+
+
+def bordered(
+    solve: Solver, right: np.ndarray, V: np.ndarray, left: np.ndarray, balance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Solve A x + left lambda = right and V' x = balance, given a solver with A.
+
+    Parameters
+    ----------
+    solve
+        Solves with A (m, m) for right-hand sides (m, j).
+    right
+        (m,) right-hand side.
+    V, left
+        (m, p) columns of the border.
+    balance
+        (p,) right-hand side of the border.
+
+    Returns
+    -------
+    tuple or None
+        x (m,) and lambda (p,), the latter by least squares where it is not unique. None if a number is not finite.
+    """
+    p = len(balance)
+    x = solve(np.column_stack([right, left]) if p else right[:, None])
+    if not np.all(np.isfinite(x)):
+        return None
+    if p == 0:
+        return x[:, 0], np.zeros(0)
+    try:
+        multipliers = np.linalg.lstsq(V.T @ x[:, 1:], V.T @ x[:, 0] - balance, rcond=1e-14)[0]
+    except np.linalg.LinAlgError:
+        return None
+    return x[:, 0] - x[:, 1:] @ multipliers, multipliers

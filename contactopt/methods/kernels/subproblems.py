@@ -1,0 +1,111 @@
+"""The normal and the tangential problem from products with Q alone: active sets outside, preconditioned CG inside.
+
+Both are semismooth Newton methods on r = P(r - rho u), where P projects one kind of component and leaves the other as
+it is given: half-lines for the normal problem (primal-dual active set method), intervals or discs of the given friction
+bounds for the tangential one. Each step is one PCG of contactopt.methods.kernels.krylov. Penalty: give them Q with 1 / factor on its
+diagonal.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactopt.errors import BackendError
+from contactopt.linear.deadline import check_time
+from contactopt.linear.operators import diagonal
+from contactopt.methods.constants import ACTIVE_SETS, SUCCESS, WEIGHT_FALL, WEIGHT_RISE
+from contactopt.methods.kernels.krylov import krylov_step
+from contactopt.methods.kernels.semismooth import Equations, Projection
+from contactopt.methods.preconditioners import Preconditioner
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.cones import disc_derivative, half_line_derivative
+
+LOOPS = 60  # proximal steps
+EXACT = 1e-10  # residual relative to the size of the forces at which a subproblem is solved
+USABLE = 1e-5  # and above which there is no answer
+
+Iterate = tuple[np.ndarray, np.ndarray]
+
+
+class KrylovSubproblem:
+    """One kind of components of a dimensionless problem; columns: mask (p,) of the multipliers that belong to it."""
+
+    def __init__(self, problem: InterfaceProblem, P: Preconditioner, columns: np.ndarray, normal: bool):
+        self.problem, self.P, self.columns, self.normal = problem, P, columns, normal
+        self.own = slice(0, 1) if normal else slice(1, None)
+        compliance = diagonal(problem.Q).reshape(problem.q.shape)
+        self.compliance = compliance[:, 0] if normal else compliance[:, 1:].mean(axis=1)
+
+    def solve(self, r: np.ndarray, multipliers: np.ndarray) -> Iterate:
+        """r (k, dim) with its own components new, and the multipliers (columns,).
+
+        Active sets from r, from the glued solution if r has no such force yet. Where they cycle: the proximal loop
+        (contactopt.methods.proximal), each step a problem whose active sets are easier to find. Raises BackendError if that does not come near a solution either.
+        """
+        equations = self._equations(r, multipliers, None, 0.0)
+        point = r, multipliers[self.columns]
+        if not r[:, self.own].any():
+            point = self._glued(*point, equations)
+        residual, point = self._active_sets(equations, *point)
+        size, weight = max(1.0, float(np.linalg.norm(point[0]))), 1.0
+        for _ in range(LOOPS):
+            if residual <= EXACT * size:
+                return point
+            left, new = self._active_sets(self._equations(r, multipliers, point[0], weight), *point)
+            if left <= SUCCESS * residual:
+                point, weight = new, weight / WEIGHT_FALL
+                residual = equations.evaluate(*point)[0]
+            else:
+                weight *= WEIGHT_RISE
+        if residual > USABLE * size:
+            kind = "normal" if self.normal else "tangential"
+            raise BackendError(f"backend 'pcg' misses the {kind} problem by {residual / size:.1e}")
+        return point
+
+    def _equations(self, r: np.ndarray, multipliers: np.ndarray, center: np.ndarray | None, weight: float) -> Equations:
+        problem, own = self.problem, self.columns
+        q = problem.q + (problem.V[:, ~own] @ multipliers[~own]).reshape(r.shape)
+        rho = 1 / (self.compliance + weight)
+        return Equations(problem.Q, q, problem.V[:, own], problem.s[own], self._projection(r), rho, center, weight)
+
+    def _active_sets(self, equations: Equations, r: np.ndarray, lam: np.ndarray) -> tuple[float, Iterate]:
+        """The best of ACTIVE_SETS Newton iterates, and its residual."""
+        best, point, last = np.inf, (r, lam), np.inf
+        for _ in range(ACTIVE_SETS):
+            check_time()
+            residual, error, balance, D = equations.evaluate(r, lam)
+            if residual < best:
+                best, point = residual, (r, lam)
+            size = max(1.0, float(np.linalg.norm(r)))
+            if residual <= EXACT * size:
+                break
+            rtol = min(1e-2, max(1e-8, min(0.1 * EXACT * size / residual, residual / last)))
+            step = krylov_step(equations, self.P, error, balance, D, rtol)
+            if step is None:
+                break
+            r, lam, last = r + step[0], lam + step[1], residual
+        return best, point
+
+    def _glued(self, r: np.ndarray, lam: np.ndarray, equations: Equations) -> Iterate:
+        """All contacts held by whatever force it takes."""
+        D = np.zeros((*r.shape, r.shape[1]))
+        D[:, self.own, self.own] = np.eye(r.shape[1])[self.own, self.own]
+        u = (equations.Q @ r.ravel() + equations.V @ lam).reshape(r.shape) + equations.q
+        error = np.zeros(r.shape)
+        error[:, self.own] = -equations.rho[:, None] * u[:, self.own]
+        step = krylov_step(equations, self.P, error, equations.V.T @ r.ravel() + equations.s, D, 1e-2)
+        return (r, lam) if step is None else (r + step[0], lam + step[1])
+
+    def _projection(self, given: np.ndarray) -> Projection:
+        """y (k, dim) -> the projection of the own components beside the given others, and its derivative."""
+        own, low, radius = self.own, self.problem.law.lowest, self.problem.law.bound(given[:, 0])
+
+        def project(y: np.ndarray) -> Iterate:
+            P, D = given.copy(), np.zeros((*y.shape, y.shape[1]))
+            if not self.normal:
+                P[:, own], D[:, own, own] = disc_derivative(y[:, own], radius)
+            else:
+                P[:, own], D[:, own, own] = half_line_derivative(y[:, own], low)
+            return P, D
+
+        return project

@@ -1,0 +1,160 @@
+"""Newton's method on nested grids, for problems whose Q is a convolution: half-spaces, rough surfaces.
+
+The problem is solved on coarse grids first, where it costs little to find out which contacts close and slip; each solution
+starts the next finer grid. The steps are those of the primal-dual active set method (`newton`), whose linear systems are
+solved by PCG or GMRES in single precision to the accuracy that the step is worth, while residuals are computed in double
+precision. Without friction only the normal components are computed.
+Sources: Polonsky, Keer (1999), A numerical method for solving rough contact problems based on the multi-level multi-summation
+and conjugate gradient techniques, for contact by FFT and conjugate gradients; Hueber, Stadler, Wohlmuth (2008) for the active
+sets; Eisenstat, Walker (1996) for the accuracy of steps.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import ClassVar
+
+import numpy as np
+
+from contactopt.errors import InputError
+from contactopt.linear.convolution import Convolution
+from contactopt.methods import find_method
+from contactopt.methods.constants import (
+    CLOSER,
+    COARSE_ENOUGH,
+    COARSE_STEPS,
+    COARSE_TRIES,
+    COARSEST_ENOUGH,
+    NESTED_LOOSEST,
+    NESTED_TIGHTEST,
+)
+from contactopt.methods.kernels.levels import Evaluation, Level, Point, step
+from contactopt.methods.method import NATIVE, Iterate
+from contactopt.methods.notes import note
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.laws.law import Law
+
+logger = logging.getLogger(__name__)
+
+NEAR = 1e-8  # residual over the size of the forces, from which on iterates of the finest grid are shown to the driver
+
+
+@dataclass(frozen=True)
+class Nested:
+    """No settings."""
+
+    implicit: ClassVar[bool] = True
+
+    def solves(self, law: Law) -> bool:
+        return True
+
+    def backends(self, dim: int) -> tuple[str, str]:
+        return NATIVE, NATIVE
+
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
+        for point, _ in self.steps(problem, start):
+            yield point
+
+    def steps(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[tuple[Iterate, float]]:
+        """Iterates on the finest grid with the residual of the equations."""
+        if not isinstance(problem.Q, Convolution):
+            raise InputError("the method 'nested' needs half-spaces on both sides, or one on a rigid body; use 'auto'.")
+        levels = [Level.of_problem(problem)]
+        while levels[-1].halves:
+            levels.append(levels[-1].coarse())
+        given = None if start is None else (start[0].T[list(levels[0].components)].copy(), start[1])
+        point = (
+            _robust_start(levels[-1], _first_guess(levels, given)) if len(levels) > 1 else _first_guess(levels, given)
+        )
+        for coarse, fine in zip(levels[:0:-1], levels[-2::-1]):
+            point, at = _solve_level(coarse, point)
+            logger.info("grid %s: residual %.1e", coarse.kernel.grid, at.residual)
+            point = fine.refined(point, coarse)
+        finest, at, last = levels[0], levels[0].evaluate(*point), np.inf
+        if given is not None:
+            other = finest.evaluate(*given)
+            point, at = (given, other) if other.residual < CLOSER * at.residual else (point, at)
+        while True:
+            if at.residual <= NEAR * max(1.0, float(np.linalg.norm(point[0]))) or at.residual > 0.5 * last:
+                yield (_whole(problem, point[0] + at.error), point[1]), at.residual
+            change, count = step(finest, at, _worth(at.residual, last))
+            last = at.residual
+            point = point[0] + change[0], point[1] + change[1]
+            at = finest.evaluate(*point)
+            logger.info(
+                "grid %s: %d closed, %d iterations, residual %.1e",
+                finest.kernel.grid,
+                len(at.closed),
+                count,
+                at.residual,
+            )
+
+
+def _first_guess(levels: list[Level], given: Point | None) -> Point:
+    """A point on the coarsest level: the one given, or the forces spread evenly that balance the loads."""
+    coarsest = levels[-1]
+    if given is not None:
+        for level in levels[:-1]:
+            given = level.restricted(given)
+        return given
+    r = np.zeros(coarsest.q.shape)
+    if len(coarsest.s):
+        W = coarsest.V[0]
+        r[0] = W @ np.linalg.lstsq(W.T @ W, -coarsest.s, rcond=None)[0]
+    moved = coarsest.product(r) + coarsest.q
+    lam = np.zeros(len(coarsest.s))
+    if len(lam):
+        lam = np.linalg.lstsq(coarsest.V.reshape(-1, len(lam)), -moved.ravel(), rcond=None)[0]
+    return r, lam
+
+
+def _robust_start(coarsest: Level, point: Point) -> Point:
+    """A solution on the coarsest grid: by Newton's steps, or where they go astray by the default method on an array Q."""
+    reached, at = _solve_level(coarsest, point, COARSEST_ENOUGH)
+    if (
+        at.residual <= COARSEST_ENOUGH * float(np.linalg.norm(reached[0]))
+        or len(coarsest.components) < coarsest.kernel.dim
+    ):
+        return reached
+    note(logger, "Newton's method failed on the coarsest grid, so the default method starts there from an array Q")
+    V = np.moveaxis(coarsest.V, 0, 1).reshape(coarsest.q.size, -1)
+    small = InterfaceProblem(coarsest.kernel.entries(), coarsest.q.T, coarsest.law, V=V, s=coarsest.s)
+    best = at.residual
+    for r, lam, *_ in islice(find_method("auto").iterate(small), COARSE_TRIES):
+        candidate = np.ascontiguousarray(r.T), lam
+        residual = coarsest.evaluate(*candidate).residual
+        if residual < best:
+            reached, best = candidate, residual
+        if best <= COARSEST_ENOUGH * float(np.linalg.norm(reached[0])):
+            break
+    return reached
+
+
+def _solve_level(level: Level, point: Point, enough: float = COARSE_ENOUGH) -> tuple[Point, Evaluation]:
+    """Newton's steps on a coarse grid, until the residual is small beside the forces."""
+    at, last = level.evaluate(*point), np.inf
+    for _ in range(COARSE_STEPS):
+        if at.residual <= enough * float(np.linalg.norm(point[0])):
+            break
+        change, _ = step(level, at, _worth(at.residual, last))
+        last = at.residual
+        point = point[0] + change[0], point[1] + change[1]
+        at = level.evaluate(*point)
+    return point, at
+
+
+def _worth(residual: float, last: float) -> float:
+    """Relative accuracy of a step: little while the residual does not fall, because the contacts still change."""
+    if last in (0.0, np.inf):
+        return NESTED_LOOSEST
+    return min(NESTED_LOOSEST, max(NESTED_TIGHTEST, 0.5 * (residual / last) ** 2))
+
+
+def _whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:
+    """Reactions (k, dim) from the components (c, k) that were solved for."""
+    out = np.zeros(problem.q.shape)
+    out[:, : len(r)] = r.T
+    return out

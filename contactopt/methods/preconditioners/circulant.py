@@ -1,0 +1,207 @@
+"""The paper's circulant preconditioners P21, P22 and P31 (section 5.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.fft import fft, ifft, irfft, rfft
+from scipy.sparse.linalg import LinearOperator, cg
+
+from contactopt.errors import InputError
+from contactopt.methods.preconditioners.grid import Grid, GridMap, GridMaps, on_grid
+from contactopt.problem import InterfaceProblem
+
+INNER = 1e-13  # relative accuracy of the Toeplitz solve inside P22, which makes it a fixed linear operator
+
+
+def seminorm(m: float) -> np.ndarray:
+    """Compute the first column of the sparse circulant matrix of the H^1/2 seminorm, eq (27).
+
+    It has about log2 m entries. Its rows sum to zero where m is a power of two: constants are the kernel of a seminorm.
+
+    Parameters
+    ----------
+    m
+        Half the number of nodes of the closed curve.
+
+    Returns
+    -------
+    ndarray
+        (2 m,) column.
+    """
+    column, top = np.zeros(round(2 * m)), int(np.ceil(np.log2(m)))
+    column[0] = 2 * np.sum(1 / np.arange(1, 2**top) ** 2.0)
+    for i in range(1, top + 1):
+        j = 2**i - 1
+        if j < m:
+            column[[j, -j]] -= np.sum(1 / np.arange(2 ** (i - 1), 2**i) ** 2.0)
+    return column
+
+
+def norm(m: float, h: float) -> np.ndarray:
+    """Compute the first column of the circulant matrix of the H^1 norm, eq (28).
+
+    Parameters
+    ----------
+    m
+        Half the number of nodes of the closed curve.
+    h
+        The distance of two nodes.
+
+    Returns
+    -------
+    ndarray
+        (2 m,) column.
+    """
+    column = np.zeros(round(2 * m))
+    column[0], column[[1, -1]] = 2 / h + h, -1 / h
+    return column
+
+
+def p21(problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
+    """P21 of eq (25) or, in 3D, P31 of eq (29) on the grid of the contacts.
+
+    Parameters
+    ----------
+    problem : whose contacts lie on a line or a rectangular grid of their chart
+    held : (k, dim) mask of the components that cannot move
+
+    Returns
+    -------
+    Products with P and, where it is cheap, with its inverse; they act on arrays (k, dim).
+
+    Raises
+    ------
+    InputError : if the contacts lie on no such grid
+    """
+    return on_grid(problem, held, extended)
+
+
+def p22(problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
+    """P22 of eq (26) on the contact line.
+
+    Parameters
+    ----------
+    problem : whose contacts lie on a line or a rectangular grid of their chart
+    held : (k, dim) mask of the components that cannot move
+
+    Returns
+    -------
+    Products with P and, where it is cheap, with its inverse; they act on arrays (k, dim).
+
+    Raises
+    ------
+    InputError : if the contacts lie on no such grid
+    """
+    return on_grid(problem, held, inverse_of_extended)
+
+
+def extended(grid: Grid) -> tuple[GridMap, None]:
+    """P21 = E' Q_c E of eq (25) on a line; on a rectangle its sum along both directions, P31 of eq (29).
+
+    Parameters
+    ----------
+    grid : of the contacts
+
+    Returns
+    -------
+    The product of P with arrays (*shape, dim), and None because its inverse is not cheap.
+    """
+    if grid.closed:
+        symbol, smallest = _closed_symbol(*grid.shape)
+        return _circular(np.maximum(symbol, smallest / 2)), None
+    lines = [restricted_circulant(rfft(seminorm(closed_curve(k))).real, k, axis) for axis, k in enumerate(grid.shape)]
+    return lambda X: np.sum([line(X) for line in lines], axis=0), None
+
+
+def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
+    """P22 = (E' L_c^-1 Q_c E)^-1 of eq (26), a Toeplitz system solved by conjugate gradients.
+
+    The spacing h of eq (28) is measured in quarters of the contact line's length, so that units do not matter.
+
+    Parameters
+    ----------
+    grid : of the contacts, a line
+
+    Returns
+    -------
+    The products of P and of its inverse with arrays (k, dim).
+
+    Raises
+    ------
+    InputError : on a surface, where the paper defines no P22
+    """
+    if len(grid.shape) > 1:
+        raise InputError("preconditioner 'p22' is for contact lines (2D); in 3D choose p21 or neumann.")
+    (k,) = grid.shape
+    if grid.closed:
+        symbol, smallest = _closed_symbol(k)
+        symbol = np.maximum(symbol, smallest / 2) / fft(norm(k / 2, 4 / k)).real
+        return _circular(1 / symbol), _circular(symbol)
+    m = closed_curve(k)
+    symbol = rfft(seminorm(m)).real / rfft(norm(m, 4 / (k - 1))).real
+    product, guess = restricted_circulant(symbol, k, 0), extended(grid)[0]
+    toeplitz = LinearOperator((k, k), matvec=lambda x: product(x.reshape(k, 1))[:, 0], dtype=float)
+    near = LinearOperator((k, k), matvec=lambda x: guess(x.reshape(k, 1))[:, 0], dtype=float)
+
+    def solve(X: np.ndarray) -> np.ndarray:
+        return np.stack([cg(toeplitz, x, rtol=INNER, maxiter=500, M=near)[0] for x in X.T], axis=1)
+
+    return solve, product
+
+
+def _closed_symbol(k: int) -> tuple[np.ndarray, float]:
+    """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the smallest of them that is not zero.
+
+    A closed curve needs no extension. The eigenvalue of constant functions must be zero. Where k is no power of two, the
+    column of eq (27) does not sum to zero, and its sum is subtracted from every eigenvalue.
+    """
+    symbol = fft(seminorm(k / 2)).real
+    symbol = symbol - symbol[0]
+    return symbol, float(symbol[1:].min())
+
+
+def _circular(symbol: np.ndarray) -> GridMap:
+    """Circulant matrix with that (real, symmetric) symbol (k,) along the first axis."""
+    return lambda X: np.asarray(ifft(symbol[:, None] * fft(X, axis=0), axis=0).real)
+
+
+def closed_curve(k: int) -> int:
+    """Choose half the number of nodes of the closed curve.
+
+    Parameters
+    ----------
+    k
+        Number of contacts.
+
+    Returns
+    -------
+    int
+        A power of two, at least k.
+    """
+    return int(2 ** np.ceil(np.log2(k)))
+
+
+def restricted_circulant(symbol: np.ndarray, k: int, axis: int) -> GridMap:
+    """Make the product E' C E along one axis of k nodes, for a circulant matrix C and the extension E by zero.
+
+    Parameters
+    ----------
+    symbol
+        (m + 1,) eigenvalues of C, which is real and symmetric, of size 2 m.
+    k
+        Number of nodes along the axis.
+    axis
+        The axis of the grid.
+
+    Returns
+    -------
+    callable
+        The product on arrays on the grid.
+    """
+    n = 2 * (len(symbol) - 1)
+
+    def product(X: np.ndarray) -> np.ndarray:
+        lines = np.moveaxis(X, axis, -1)
+        return np.moveaxis(irfft(symbol * rfft(lines, n=n), n=n)[..., :k], -1, axis)
+
+    return product

@@ -1,0 +1,102 @@
+"""Tresca iteration: Coulomb friction by successive problems whose friction bounds are given.
+
+Each outer iteration solves ONE convex problem, normal and tangential forces together,
+    min  r' Q r / 2 + q' r    subject to  r_n >= 0,  |r_t| <= g,  V' r + s = 0,
+a box-constrained QP with one tangential direction, an SOCP with two, and then sets g = mu |r_n|. Its answer is made
+exact by Newton steps on r = P(r - u), P the projection on half-lines and discs. The first bounds are those of the bonded
+problem if a plate presses the bodies together, else zero: then the first iterate is contact without friction.
+Converges linearly, at a rate proportional to mu times the coupling of normal and tangential forces; beyond a critical
+mu it cycles, and relaxation < 1 then often helps. A fixed point is exactly a solution of Coulomb's problem. Bounds too
+small for a plate that is dragged tangentially leave the convex problem without an answer.
+Sources: Panagiotopoulos (1975); Haslinger, Dostal, Kucera (2002), On a splitting type algorithm for the numerical
+realization of contact problems with Coulomb friction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactopt.checks import check_number
+from contactopt.methods.backends import CONIC, QP, find
+from contactopt.methods.backends.conic import Conic
+from contactopt.methods.backends.qp import BoxQP
+from contactopt.methods.kernels.semismooth import Projection, crossover
+from contactopt.methods.method import Iterate
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.cones import cylinder_derivative
+from contactopt.problem.laws.law import Law
+
+
+@dataclass(frozen=True)
+class Tresca:
+    """The fixed point of Tresca: convex programs with friction bounds of the solution before.
+
+    Parameters
+    ----------
+    backend
+        Name of the QP backend in 2D and of the conic backend in 3D. None: proxqp and clarabel.
+    relaxation
+        Fraction of each change of the friction bounds that is taken, above 0 and at most 1.
+    """
+
+    backend: str | None = None
+    relaxation: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_number("the relaxation", self.relaxation, low=0.0, high=1.0 + 1e-12)
+
+    def backends(self, dim: int) -> tuple[str, str]:
+        name = self.backend or ("proxqp" if dim == 2 else "clarabel")
+        return (find(name, QP if dim == 2 else CONIC).name,) * 2
+
+    def solves(self, law: Law) -> bool:
+        return law.bounded and not law.dilatant
+
+    def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
+        convex = TrescaProblem(self.backends(problem.dim)[0], problem)
+        r = _glued(problem) if start is None else start[0]
+        g = problem.law.bound(r[:, 0])
+        while True:
+            r, multipliers = convex.solve(g, r)
+            g = g + self.relaxation * (problem.law.bound(r[:, 0]) - g)
+            yield r, multipliers
+
+
+def _glued(problem: InterfaceProblem) -> np.ndarray:
+    """Reactions (k, dim) of contacts that all stick if plates press the bodies together, else zeros."""
+    r, (k, dim) = np.zeros(problem.q.shape), problem.q.shape
+    if len(problem.s) == 0:
+        return r
+    eye = np.broadcast_to(np.eye(dim), (k, dim, dim))
+    c, lam = problem.q.ravel(), np.zeros(len(problem.s))
+    return crossover(problem.Q, c, problem.V, problem.s, lambda y: (y, eye), r, lam, steps=2)[0]
+
+
+class TrescaProblem:
+    """The convex problem, handed to its backend once."""
+
+    def __init__(self, backend: str, problem: InterfaceProblem):
+        self.problem = problem
+        self.low = problem.law.lowest
+        self.solver: BoxQP | Conic
+        if problem.dim == 2:
+            self.solver = BoxQP.using(backend, problem.Q, problem.V.T)
+        else:
+            from contactopt.models import tresca
+
+            self.solver = Conic.using(backend, tresca(problem), problem.Q)
+
+    def solve(self, g: np.ndarray, start: np.ndarray) -> Iterate:
+        """r (k, dim) and the multipliers (p,) for the bounds g (k,)."""
+        problem, c = self.problem, self.problem.q.ravel()
+        if isinstance(self.solver, BoxQP):
+            low, high = np.stack([self.low, -g], axis=1), np.stack([np.full(len(g), np.inf), g], axis=1)
+            r, lam = self.solver.solve(c, -problem.s, low.ravel(), high.ravel(), start=start.ravel())
+        else:
+            answer = self.solver.solve(g=g)
+            r, lam = answer["r"], answer["approach"]
+        project: Projection = lambda y: cylinder_derivative(y, g, self.low)  # noqa: E731
+        return crossover(problem.Q, c, problem.V, problem.s, project, r.reshape(problem.q.shape), lam)

@@ -1,0 +1,434 @@
+"""What all laws of contact and friction share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from contactopt.checks import real_array
+from contactopt.errors import InputError
+from contactopt.problem.cones import unit
+
+PRESSED = 1e-8  # normal forces below this fraction of the largest are rounding: the contact is open
+
+
+BELOW = 1e-6  # a tangential force sticks if it is below its bound by more than this, relative to the bound
+
+
+Projected = tuple[np.ndarray, np.ndarray]  # points (k, dim) and the generalised derivative (k, dim, dim)
+
+
+class Kinks(NamedTuple):
+    """Where the map P of a law has no derivative: two masks (k,), of which both hold at the apex of a cone.
+
+    normal      on the edge between open and closed;  tangential  on the edge between stick and slip
+    """
+
+    normal: np.ndarray
+    tangential: np.ndarray
+
+
+class Law:
+    """What all laws share. A law of its own needs `bound` and `nearest_derivative`; the rest has defaults.
+
+    The fields of a law are its parameters: arrays (k,) of numbers that are not negative, or one number for all contacts.
+    Methods ask a law for these properties, never for its name:
+
+    convex        solutions minimise r' Q r / 2 + q' r over a fixed convex set, and `project` is the projection on it
+    proportional  the friction bound is mu |r_n|, with mu the coefficient
+    dilatant      slip opens the gap
+    bounded       tangential forces have a bound
+    """
+
+    convex: bool = False
+    proportional: bool = False
+    dilatant: bool = False
+    bounded: bool = True
+
+    def __post_init__(self) -> None:
+        for name in self.parameters:
+            value = real_array(name, getattr(self, name))
+            if value.ndim > 1:
+                raise InputError(f"{name} must be a number or one number per contact; got shape {value.shape}.")
+            if np.any(value < 0):
+                what = {"mu": "the friction coefficient mu", "limit": "the friction bound"}.get(name, name)
+                raise InputError(f"{what} must not be negative; its least value is {value.min():g}.")
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(f.name for f in fields(self))  # type: ignore[arg-type]
+
+    @property
+    def contacts(self) -> int:
+        """Number of contacts k of a law whose parameters are arrays."""
+        return len(getattr(self, self.parameters[0]))
+
+    @property
+    def lowest(self) -> np.ndarray:
+        """(k,) least normal force [force]: 0 where a contact may open, -inf where it cannot."""
+        return np.zeros(self.contacts)
+
+    @property
+    def unilateral(self) -> bool:
+        """Whether every contact may open."""
+        return bool(np.all(self.lowest == 0))
+
+    @property
+    def coefficient(self) -> np.ndarray:
+        """(k,) friction coefficients, 0 where the law has none."""
+        return np.zeros(self.contacts)
+
+    @property
+    def rough(self) -> np.ndarray:
+        """(k,) mask of the contacts that can carry a tangential force."""
+        return self.coefficient > 0
+
+    def bound(self, r_n: np.ndarray) -> np.ndarray:
+        """Compute the largest tangential force that each contact can carry.
+
+        Parameters
+        ----------
+        r_n
+            (k,) normal forces [force].
+
+        Returns
+        -------
+        ndarray
+            (k,) largest |r_t| [force].
+        """
+        raise NotImplementedError
+
+    def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
+        """Project points on the set K of forces, with the generalised derivative of the projection.
+
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+        r_n
+            (k,) normal forces that say which set K is, where it depends on them. The derivative takes them as given.
+
+        Returns
+        -------
+        tuple
+            The nearest points (k, dim), and their derivatives (k, dim, dim).
+        """
+        raise NotImplementedError
+
+    def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
+        """Project points on the set K of forces.
+
+        Parameters
+        ----------
+        y, r_n
+            As for `nearest_derivative`.
+
+        Returns
+        -------
+        ndarray
+            (k, dim) nearest points [force].
+        """
+        return self.nearest_derivative(y, r_n)[0]
+
+    def project(self, y: np.ndarray) -> Projected:
+        """Evaluate the map P of Newton's equations r = P(r - rho u), and its generalised derivative.
+
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+
+        Returns
+        -------
+        tuple
+            P(y) (k, dim), and its derivatives (k, dim, dim).
+        """
+        return self.nearest_derivative(y, y[:, 0])
+
+    def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
+        """Differentiate `project` by the law's parameter at each contact.
+
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+
+        Returns
+        -------
+        ndarray
+            (k, dim) derivatives.
+
+        Raises
+        ------
+        InputError
+            For a law that does not know it.
+        """
+        raise InputError(f"the law {type(self).__name__} has no derivative by its parameter (project_by_parameter).")
+
+    def kinks(self, y: np.ndarray, distance: float) -> Kinks:
+        """Find the contacts whose point lies near a kink of `project`.
+
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+        distance
+            How near counts [force].
+
+        Returns
+        -------
+        Kinks
+            Two masks (k,).
+        """
+        normal = (np.abs(y[:, 0]) <= distance) & ((self.lowest == 0) | self.rough)
+        slack = np.linalg.norm(y[:, 1:], axis=1) - self.bound(y[:, 0])
+        return Kinks(normal, (np.abs(slack) <= distance) & self.rough & (normal | ~self.idle(y)))
+
+    def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
+        """Move points onto their kinks.
+
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+        kinks
+            The masks of the points that are moved.
+
+        Returns
+        -------
+        ndarray
+            (k, dim) points. The others are as before.
+        """
+        out = y.copy()
+        out[kinks.normal, 0] = 0.0
+        out[:, 1:] = np.where(kinks.tangential[:, None], unit(y[:, 1:]) * self.bound(out[:, 0])[:, None], y[:, 1:])
+        return out
+
+    def idle(self, y: np.ndarray) -> np.ndarray:
+        """Tell at which points `project` and its derivative are sure to be zero.
+
+        Parameters
+        ----------
+        y
+            (k, dim) points, normal first [force].
+
+        Returns
+        -------
+        ndarray
+            (k,) mask.
+        """
+        return np.zeros(len(y), dtype=bool)
+
+    def opening(self, u_t: np.ndarray) -> np.ndarray:
+        """Compute what is added to the gap where contacts slip.
+
+        Parameters
+        ----------
+        u_t
+            (k, dim - 1) tangential displacements [length].
+
+        Returns
+        -------
+        ndarray
+            g (k,) [length].
+        """
+        return np.zeros(len(u_t))
+
+    def natural_map(self, r: np.ndarray, u: np.ndarray, rho: float | np.ndarray) -> np.ndarray:
+        """Evaluate proj_K(r - rho (u + g n)), which is equal to r exactly where r and u obey the law.
+
+        Parameters
+        ----------
+        r, u
+            Forces [force] and displacements [length] (k, dim), normal first.
+        rho
+            Step [force / length], one number or one per contact (k,).
+
+        Returns
+        -------
+        ndarray
+            (k, dim) forces [force].
+        """
+        step = np.asarray(rho)[..., None] if np.ndim(rho) else rho
+        shifted = r - step * u
+        shifted[:, 0] -= rho * self.opening(u[:, 1:])
+        return self.nearest(shifted, r[:, 0])
+
+    def pressed(self, r: np.ndarray) -> np.ndarray:
+        """Tell which contacts touch: they carry a normal force beyond rounding, or cannot open.
+
+        Parameters
+        ----------
+        r
+            (k, dim) contact forces, normal first [force].
+
+        Returns
+        -------
+        ndarray
+            (k,) mask.
+        """
+        size = np.abs(r[:, 0])
+        return np.asarray((size > PRESSED * size.max(initial=0.0)) | (self.lowest < 0))
+
+    def sticking(self, r: np.ndarray) -> np.ndarray:
+        """Tell which contacts are pressed and carry a tangential force below its bound.
+
+        Parameters
+        ----------
+        r
+            (k, dim) contact forces, normal first [force].
+
+        Returns
+        -------
+        ndarray
+            (k,) mask.
+        """
+        return self.pressed(r) & (np.linalg.norm(r[:, 1:], axis=1) < (1 - BELOW) * self.bound(r[:, 0]))
+
+    def slipping(self, r: np.ndarray) -> np.ndarray:
+        """Tell which contacts are pressed and carry a tangential force at its bound.
+
+        Parameters
+        ----------
+        r
+            (k, dim) contact forces, normal first [force].
+
+        Returns
+        -------
+        ndarray
+            (k,) mask.
+        """
+        return self.pressed(r) & ~self.sticking(r)
+
+    def scaled(self, force: float) -> Self:
+        """Write the same law with forces in another unit.
+
+        Parameters
+        ----------
+        force
+            The unit [force].
+
+        Returns
+        -------
+        Law
+            The law in that unit.
+        """
+        return self
+
+    def times(self, factor: float) -> Self:
+        """Multiply the friction of the law.
+
+        Parameters
+        ----------
+        factor
+            What it is multiplied with.
+
+        Returns
+        -------
+        Law
+            The law with that friction.
+        """
+        return self._mapped(lambda parameter: factor * parameter)
+
+    def shifted(self, change: np.ndarray) -> Self:
+        """Change the parameter of the law. It does not fall below zero.
+
+        Parameters
+        ----------
+        change
+            (k,) what is added.
+
+        Returns
+        -------
+        Law
+            The law with that parameter.
+        """
+        return self._mapped(lambda parameter: np.maximum(parameter + change, 0.0))
+
+    def select(self, contacts: np.ndarray) -> Law:
+        """Take the law of some contacts alone.
+
+        Parameters
+        ----------
+        contacts
+            Their numbers, with repetitions if wanted, or a mask (k,).
+
+        Returns
+        -------
+        Law
+            The law of these contacts.
+        """
+        return self._mapped(lambda parameter: parameter[contacts])
+
+    def lumped(self, first: np.ndarray, count: int) -> Law:
+        """Make the law of groups of contacts that act as one.
+
+        Parameters
+        ----------
+        first
+            The first contact of each group.
+        count
+            Number of contacts of a group.
+
+        Returns
+        -------
+        Law
+            The law, with one contact for each group.
+        """
+        return self.select(first)
+
+    def spread(self, k: int) -> Self:
+        """Make the law of k contacts: numbers become arrays (k,).
+
+        Parameters
+        ----------
+        k
+            Number of contacts.
+
+        Returns
+        -------
+        Law
+            The law with arrays.
+
+        Raises
+        ------
+        InputError
+            On arrays of another length.
+        """
+        for name in self.parameters:
+            if np.ndim(getattr(self, name)) and np.shape(getattr(self, name)) != (k,):
+                raise InputError(f"{name} must have shape {(k,)}; got {np.shape(getattr(self, name))}.")
+        return self._mapped(lambda parameter: np.broadcast_to(parameter, (k,)))
+
+    @classmethod
+    def of_place(cls, values: np.ndarray, areas: np.ndarray) -> Law:
+        """Make the law of a scene's contacts from the values that the scene gives.
+
+        Parameters
+        ----------
+        values
+            (k,) friction coefficients, unless the law says otherwise.
+        areas
+            (k,) nodal areas [length^2].
+
+        Returns
+        -------
+        Law
+            The law of the k contacts.
+        """
+        return cls(values)  # type: ignore[call-arg]
+
+    @property
+    def digest(self) -> bytes:
+        """The law's name and parameters as bytes, for a problem's fingerprint."""
+        name = type(self).__name__.encode()
+        return name + b"".join(np.ascontiguousarray(getattr(self, p)).tobytes() for p in self.parameters)
+
+    def _mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> Self:
+        return replace(self, **{name: change(getattr(self, name)) for name in self.parameters})  # type: ignore[type-var]

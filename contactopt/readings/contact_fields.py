@@ -1,0 +1,142 @@
+"""Contact quantities as fields: on the surface of every pair, and on the nodes of the bodies, as VTU files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from contactopt.coupling.back_to_bodies import Fields
+from contactopt.coupling.reduction import Reduction
+from contactopt.meshes.cells import facet_nodes
+from contactopt.problem import Solution
+from contactopt.problem.contact_status import contact_status
+from contactopt.readings.resultants import space_forces
+from contactopt.scenes.scene import Part
+
+NEAR = 1.5  # distances between contacts, beyond the gap, up to which a node of a body belongs to a contact
+CELLS = {2: "line", 3: "triangle", 4: "quad"}  # by their corners
+
+
+@dataclass(frozen=True, eq=False)
+class ContactFields:
+    """The k contacts of a pair of surfaces after the solve. Forces are those on the upper body, vectors those of space.
+
+    points, cells  (dim, k) positions; (v, c) contacts at the corners of the cells
+    pressure       (k,) normal force over area [stress];  traction  (dim, k) whole contact force over area [stress]
+    gap            (k,) what remains of the gap [length];  slip  (dim, k) tangential motion of upper against lower [length]
+    status         (k,) 0 open, 1 stick, 2 slip
+    """
+
+    name: str
+    points: np.ndarray
+    cells: np.ndarray
+    pressure: np.ndarray
+    traction: np.ndarray
+    gap: np.ndarray
+    slip: np.ndarray
+    status: np.ndarray
+
+    @property
+    def data(self) -> dict[str, np.ndarray]:
+        """The quantities as arrays with one row per contact, vectors with three columns."""
+
+        def tall(x: np.ndarray) -> np.ndarray:
+            return np.pad(x, ((0, 3 - len(x)), (0, 0))).T
+
+        return {
+            "contact_pressure": self.pressure,
+            "contact_traction": tall(self.traction),
+            "contact_gap": self.gap,
+            "contact_slip": tall(self.slip),
+            "contact_status": self.status.astype(float),
+        }
+
+    def write_vtu(self, path: Path) -> None:
+        """The surface as a VTU file with its quantities at the contacts."""
+        import meshio
+
+        points = np.pad(self.points, ((0, 3 - len(self.points)), (0, 0))).T
+        meshio.Mesh(points, [(CELLS[len(self.cells)], self.cells.T)], self.data).write(path, file_format="vtu")
+
+
+def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFields, ...]:
+    """Collect the contact quantities on the surface of every pair.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    tuple
+        The ContactFields of each pair, in the order of the pairs.
+    """
+    problem, r = reduction.problem, solution.reactions
+    u, areas = problem.displacements(r, solution.multipliers), problem.areas
+    share = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)  # the contact on an axis has no area
+    forces, status = space_forces(reduction, solution), contact_status(problem, r)
+    slip = np.einsum("kad,ka->dk", reduction.frames[:, 1:], u[:, 1:])
+    state = np.where(status.open, 0, np.where(status.stick, 1, 2))
+    made = []
+    for pair, coupling in zip(problem.pairs, reduction.couplings):
+        own = pair.contacts
+        made.append(
+            ContactFields(
+                pair.name,
+                coupling.positions,
+                coupling.cells,
+                r[own, 0] * share[own],
+                forces[:, own] * share[own],
+                u[own, 0],
+                slip[:, own],
+                state[own],
+            )
+        )
+    return tuple(made)
+
+
+def on_nodes(
+    reduction: Reduction, fields: tuple[Fields, ...], surfaces: tuple[ContactFields, ...]
+) -> tuple[Fields, ...]:
+    """Put the contact quantities on the nodes of the bodies' contact surfaces. They are zero at all other nodes.
+
+    A node takes the values of the contact nearest to it. Traction and slip of a lower body have the opposite sign.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of the scene.
+    fields
+        The displacements and stresses of the bodies.
+    surfaces
+        The contact quantities of each pair, as `contact_fields` gives them.
+
+    Returns
+    -------
+    tuple
+        The fields of the bodies with the contact quantities added.
+    """
+    default = {part.name: part.contact for part in reduction.scene.parts if isinstance(part, Part)}
+    made = []
+    for body in fields:
+        data = {name: np.zeros((body.mesh.p.shape[1], *value.shape[1:])) for name, value in surfaces[0].data.items()}
+        for pair, surface, coupling in zip(reduction.scene.pairs, surfaces, reduction.couplings):
+            for side, (name, boundary) in enumerate(zip(pair.bodies, pair.surfaces)):
+                if name != body.name:
+                    continue
+                nodes = facet_nodes(body.mesh, body.mesh.boundaries[boundary or default[name]])
+                tree = KDTree(surface.points.T)
+                spacing = tree.query(surface.points.T, k=min(2, len(surface.gap)))[0].reshape(len(surface.gap), -1)
+                apart, nearest = tree.query(body.mesh.p[:, nodes].T)
+                near = apart <= np.abs(coupling.gap[nearest]) + NEAR * spacing[nearest, -1]
+                for key, value in surface.data.items():
+                    sign = -1.0 if side == 1 and value.ndim == 2 else 1.0
+                    data[key][nodes[near]] = sign * value[nearest[near]]
+        made.append(replace(body, contact=data))
+    return tuple(made)

@@ -1,0 +1,231 @@
+"""Where contact and stick end, below the element size: the one definition of the half-width of a zone.
+
+Next to an edge at distance c from the centre of a zone, the pressure (where contact ends by itself) and the slack of the
+friction bound (where stick ends) are proportional to sqrt(c^2 - x^2), and the slip beyond c to (x - c)^(3/2). A straight
+line through the squares of values inside, against x^2, or through slip^(2/3), against x, meets zero at the edge.
+
+The nodes at the edge of a discrete zone jump as the exact edge moves, and so do the values at the nodes next to it. The
+values an element further hardly do. The lines therefore leave the nearest nodes out: what they read then falls smoothly
+with the element size, as the estimate of an error needs it.
+
+A zone is read at each of its ends (contactopt.readings.patches), wherever it lies on the contact surface. Its half-width is
+that of the strip, or the radius of the disc, with the same area. Where an end cannot be read, the nodal areas are counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.contact_status import contact_status
+from contactopt.readings.constants import INNER, NEAR, OUTER, SMOOTH, WITHIN
+from contactopt.readings.patches import End, patches_of
+from contactopt.scenes.scene import Scene
+
+Read = tuple[float, float]  # a distance and its uncertainty
+Reader = Callable[[End], Read | None]
+
+
+def equivalent_half_width(scene: Scene, area: float) -> float:
+    """Compute the half-width of a contact zone from its area, as if the zone were a strip, a disc or a square.
+
+    Parameters
+    ----------
+    scene
+        Its kind says which: a strip of the scene's thickness in plane strain, a disc in an axisymmetric scene, and a
+        square in space.
+    area
+        The contact area [length^2].
+
+    Returns
+    -------
+    float
+        Half the width of the strip or of the square, or the radius of the disc [length].
+    """
+    if scene.kind == "plane-strain":
+        return area / (2 * scene.thickness)
+    return float(np.sqrt(area / np.pi) if scene.kind == "axisymmetric" else np.sqrt(area) / 2)
+
+
+def contact_area(scene: Scene, half_width: float) -> float:
+    """Compute the contact area of a given half-width, the inverse of `equivalent_half_width`.
+
+    Parameters
+    ----------
+    scene
+        Its kind says which: a strip of the scene's thickness in plane strain, a disc in an axisymmetric scene, and a
+        square in space.
+    half_width
+        Half the width of the strip or of the square, or the radius of the disc [length].
+
+    Returns
+    -------
+    float
+        The area [length^2].
+    """
+    if scene.kind == "plane-strain":
+        return 2 * half_width * scene.thickness
+    return float(np.pi * half_width**2 if scene.kind == "axisymmetric" else 4 * half_width**2)
+
+
+def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
+    """Read the half-width of the contact zone [length], as contact_zone() does."""
+    return contact_zone(scene, problem, reactions)[0]
+
+
+def contact_zone(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> tuple[float, float]:
+    """Read the half-width of the contact zone, with its uncertainty.
+
+    Where contact ends by itself on a line, its edge is the zero of a parabola through p^2 against x^2 over the outer
+    part of the half-width, without the last two nodes, weighted by the nodal areas. On a surface, where fewer than three
+    nodes are left, and where the other end is a corner, a straight line goes through the rings of nodes next to the edge.
+    Where every node touches, or where contact ends at a corner, the edge is that of the contact surface. A reading on a
+    surface counts only where the disc of that radius has the area of the zone to within an element. The uncertainty is
+    half of what the parabola and the straight line differ, WITHIN of an element at least. Where areas of nodes are
+    counted, it is that of the nodes at the edge.
+
+    Parameters
+    ----------
+    scene
+        The scene, which says what symmetry left out.
+    problem
+        Its interface problem, or that of one pair of surfaces.
+    reactions
+        (k, dim) contact forces, normal first [force].
+
+    Returns
+    -------
+    tuple
+        The half-width and its uncertainty [length]; both are 0 without contact.
+    """
+    touching = contact_status(problem, reactions).touching
+    pressure = reactions[:, 0] / problem.areas
+
+    def read(end: End) -> Read | None:
+        line = end.inner(pressure, SMOOTH)
+        line = None if line is None else end.clip(line)
+        if problem.dim == 2 and end.free:
+            edge = _zero_of_parabola(end, pressure, problem.areas)
+            if edge is not None:
+                return edge, end.step / 2 if line is None else abs(edge - line) / 2
+        return None if line is None else (line, end.step / 2)
+
+    return _half_width(scene, problem, touching, np.abs(reactions[:, 0]), read)
+
+
+def stick_edge(
+    scene: Scene, problem: InterfaceProblem, reactions: np.ndarray, slip: np.ndarray | None = None
+) -> tuple[float, float]:
+    """Read the half-width of the stick zone, with its uncertainty.
+
+    The slack of the friction bound counts towards the direction in which the nearest slipping node slips. Where contact
+    ends at a corner, the pressure is singular: the slack relative to its bound stays smooth but not straight. The
+    values nearest to the edge then serve best, and the edge is the mean of what the slack inside and the slip outside
+    read; it is as uncertain as they differ. A reading that is off by more than an element is left out, which happens to
+    the slip of small steps of a load path.
+
+    Parameters
+    ----------
+    scene
+        The scene, which says what symmetry left out.
+    problem
+        Its interface problem, or that of one pair of surfaces.
+    reactions
+        (k, dim) contact forces, normal first [force].
+    slip
+        (k, dim - 1) tangential motion of the step that led to the reactions [length], if known.
+
+    Returns
+    -------
+    tuple
+        The half-width and its uncertainty [length].
+    """
+    status = contact_status(problem, reactions)
+    contact, uncertain = contact_zone(scene, problem, reactions)
+    if not status.stick.any():  # or on less than what belongs to one contact
+        least = problem.areas[problem.law.rough & status.touching]
+        return 0.0, equivalent_half_width(scene, float(least.max(initial=0.0)))
+    if not status.slip.any():
+        return contact, uncertain
+    bound, r_t = problem.law.bound(reactions[:, 0]), reactions[:, 1:]
+    slack = bound - np.sum(r_t * _directions(problem, r_t, status.slip), axis=1)
+    relative = slack / np.where(bound > 0, bound, 1.0)
+    distance = None if slip is None else np.linalg.norm(slip, axis=1)
+
+    def read(end: End) -> Read | None:
+        if status.open[end.contact].any():  # contact ends by itself beyond the stick zone
+            edge = end.inner(slack / problem.areas, SMOOTH)
+            if edge is None:
+                return None
+            other = end.inner(slack / problem.areas, NEAR)
+            apart = end.step if other is None else abs(end.clip(edge) - end.clip(other))
+            return end.clip(edge), apart / 2
+        found = [end.inner(relative, NEAR)]
+        if distance is not None:
+            found.append(end.outer(distance, NEAR))
+        edges = [edge for edge in found if edge is not None and end.clip(edge) == edge]
+        if not edges:
+            return None
+        return float(np.mean(edges)), float(np.ptp(edges) if len(edges) > 1 else end.step) / 2
+
+    width, uncertainty = _half_width(scene, problem, status.stick, problem.areas, read)
+    return min(width, contact), uncertainty
+
+
+def _half_width(
+    scene: Scene, problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray, read: Reader
+) -> tuple[float, float]:
+    """Half-width of the zone of the contacts `inside`, from the readings of its ends, and its uncertainty [length].
+
+    weights  (k,) by which the centre of a zone on a surface is averaged
+    """
+    area = float(problem.areas[inside].sum())
+    counted = equivalent_half_width(scene, area)
+    nodes = inside.sum() * 2.0 ** sum(problem.chart.mirrored)
+    share = 1 / nodes if problem.dim == 2 else (np.pi / nodes) ** 0.5 if nodes else 0.0  # of the nodes at the edge
+    coarse = counted, float(counted * min(1.0, share)) if nodes else 0.0
+    if inside.all() or not inside.any():
+        return coarse
+    if scene.kind == "axisymmetric" and not problem.chart.mirrored[0]:
+        return coarse  # a ring: its chart does not tell the distance from the axis
+    found = [patch.measure(read) for patch in patches_of(problem, inside, weights)]
+    if not found or any(patch is None for patch in found):
+        return coarse
+    ends = [patch for patch in found if patch is not None]
+    if problem.dim == 3 and abs(ends[0].last - np.sqrt(area / np.pi)) > ends[0].step:
+        return coarse  # no disc: the zone reaches the rim of the surface on some sides, or is long
+    uncertainty = sum(patch.copies * max(patch.uncertainty, WITHIN * patch.step) for patch in ends)
+    if scene.kind == "axisymmetric":  # a ring between two distances from the axis, or a disc
+        squares = (abs(p.last**2 - (p.first**2 if p.first > 0 or p.last < 0 else 0)) for p in ends)
+        return float(np.sqrt(sum(squares))), uncertainty
+    return sum(patch.copies * (patch.last - patch.first) / 2 for patch in ends), uncertainty
+
+
+def _zero_of_parabola(end: End, pressure: np.ndarray, areas: np.ndarray) -> float | None:
+    """Where a parabola through p^2 over x^2, over the outer part of the half-width, is first zero; None if it is not.
+
+    With friction between dissimilar bodies p^2 is not straight over x^2, hence the parabola. Three nodes leave a line.
+    """
+    x, inside = end.distance, end.inside
+    last = x[inside].max()
+    innermost = np.sort(x[inside])[-OUTER:].min()
+    fitted = inside & (x >= INNER * last) & (x < innermost)
+    nodes = len(np.unique(x[fitted]))
+    if nodes < 3:
+        return None
+    square, weights = pressure[end.contact[fitted]] ** 2, np.sqrt(areas[end.contact[fitted]])
+    place = (x[fitted] / last) ** 2
+    fit = np.polyfit(place, square / square.max(), min(nodes - 2, 2), w=weights / weights.max())
+    zeros = np.roots(fit)
+    beyond = zeros.real[np.isreal(zeros) & (zeros.real > place.max())]
+    return float(last * np.sqrt(beyond.min())) if len(beyond) else None
+
+
+def _directions(problem: InterfaceProblem, r_t: np.ndarray, slipping: np.ndarray) -> np.ndarray:
+    """Unit vectors (k, dim - 1) of friction at the slipping node nearest to each node."""
+    x = problem.coordinates.T
+    nearest = r_t[np.flatnonzero(slipping)[KDTree(x[slipping]).query(x)[1]]]
+    return np.asarray(nearest / np.maximum(np.linalg.norm(nearest, axis=1), 1e-300)[:, None])

@@ -1,0 +1,208 @@
+"""What is asked of solved half-spaces: real contact area, pressures, stiffness, slip, maps, stresses below the surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, cg
+
+from contactopt.bodies.half_space import HalfSpaceBody
+from contactopt.bodies.subsurface import stress_below, von_mises
+from contactopt.coupling.reduction import Reduction
+from contactopt.errors import InputError
+from contactopt.linear.operators import block
+from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem.contact_status import contact_status
+
+STIFFNESS = 1e-8  # relative accuracy of a stiffness
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceContact:
+    """Numbers of one solved state.
+
+    area, fraction      real contact area [length^2] and its share of all cells [-]
+    stick_area, slip_area   areas of the sticking and of the slipping contacts [length^2]
+    mean_pressure       normal force over the area of all cells [stress];  contact_pressure  over the real contact area [stress]
+    largest_pressure    [stress];  mean_gap  of the open contacts [length]
+    slip_work           work of friction if the slip happened in this state's step, sum -r_t'u_t [force length]: the dissipated
+                        energy of a state reached in one step from contact without slip. Of a load path it is
+                        PathResult.history["friction_work"]
+    """
+
+    area: float
+    fraction: float
+    stick_area: float
+    slip_area: float
+    mean_pressure: float
+    contact_pressure: float
+    largest_pressure: float
+    mean_gap: float
+    slip_work: float
+
+
+def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceContact:
+    """Compute the numbers that describe one solved state.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of the state.
+    solution
+        Its solution.
+
+    Returns
+    -------
+    SurfaceContact
+        Areas, pressures, the mean gap and the work of friction.
+    """
+    r, areas = solution.reactions, problem.areas
+    status, u = contact_status(problem, r), problem.displacements(r, solution.multipliers)
+    area, whole, force = float(areas[status.touching].sum()), float(areas.sum()), float(r[:, 0].sum())
+    return SurfaceContact(
+        area=area,
+        fraction=area / whole,
+        stick_area=float(areas[status.stick].sum()),
+        slip_area=float(areas[status.slip].sum()),
+        mean_pressure=force / whole,
+        contact_pressure=force / area if area > 0 else 0.0,
+        largest_pressure=float((r[:, 0] / areas).max(initial=0.0)),
+        mean_gap=float(np.average(u[status.open, 0], weights=areas[status.open])) if status.open.any() else 0.0,
+        slip_work=-float(np.sum(r[status.slip, 1:] * u[status.slip, 1:])),
+    )
+
+
+def pressure_distribution(
+    problem: InterfaceProblem, solution: Solution, bins: int = 50
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the distribution of the pressure over the real contact area.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of the state.
+    solution
+        Its solution.
+    bins
+        Number of intervals of pressure.
+
+    Returns
+    -------
+    tuple
+        The edges (bins + 1,) of the intervals [stress], and the density (bins,) [1 / stress], whose integral is one.
+    """
+    touching = contact_status(problem, solution.reactions).touching
+    pressure = solution.reactions[touching, 0] / problem.areas[touching]
+    density, edges = np.histogram(pressure, bins, weights=problem.areas[touching], density=True)
+    return edges, density
+
+
+def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
+    """Compute the stiffness of the present contacts against relative motions of the bodies.
+
+    It is made of the forces that a small motion adds if no contact opens, closes or changes between stick and slip.
+    Contacts that slip take part with their normal components.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of the state.
+    solution
+        Its solution.
+
+    Returns
+    -------
+    ndarray
+        (dim, dim), along n, t1[, t2] [force / length]; zeros without contact.
+    """
+    status = contact_status(problem, solution.reactions)
+    takes_part = np.repeat(status.stick[:, None], problem.dim, axis=1)
+    takes_part[:, 0] = status.touching
+    rows = np.flatnonzero(takes_part.ravel())
+    if not len(rows):
+        return np.zeros((problem.dim, problem.dim))
+    Q = block(problem.Q, rows)
+    motions = np.tile(np.eye(problem.dim), (problem.contacts, 1))[rows]
+    system = LinearOperator(Q.shape, matvec=lambda x: Q @ x, dtype=float)
+    forces = np.stack(
+        [cg(system, m, rtol=STIFFNESS, maxiter=10 * len(rows))[0] if m.any() else m for m in motions.T], axis=1
+    )
+    return np.asarray(motions.T @ forces)
+
+
+def surface_maps(reduction: Reduction, solution: Solution) -> dict[str, np.ndarray]:
+    """Make maps of the contact quantities on the grid of a half-space's points.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of a scene with a half-space, whose grid has (n0[, n1]) points.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    dict
+        'pressure' (n0[, n1]) and 'traction' (n0[, n1], dim - 1) on the upper body [stress]; 'gap' (n0[, n1]) and 'slip'
+        (n0[, n1], dim - 1) [length]; and 'status' (n0[, n1]), which is 0 where open, 1 where sticking and 2 where
+        slipping.
+
+    Raises
+    ------
+    InputError
+        If the scene has no half-space.
+    """
+    problem, grid = reduction.problem, _half_space(reduction, None).grid
+    r, areas = solution.reactions, problem.areas
+    u, status = problem.displacements(r, solution.multipliers), contact_status(problem, r)
+    return {
+        "pressure": (r[:, 0] / areas).reshape(grid),
+        "traction": (r[:, 1:] / areas[:, None]).reshape(*grid, -1),
+        "gap": u[:, 0].reshape(grid),
+        "slip": u[:, 1:].reshape(*grid, -1),
+        "status": (status.stick + 2 * status.slip).reshape(grid),
+    }
+
+
+def subsurface_stress(
+    reduction: Reduction, solution: Solution, depths: Sequence[float], body: str | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the stresses below the points of a half-space.
+
+    Parameters
+    ----------
+    reduction
+        The reduction of a scene with a half-space, whose grid has (n0[, n1]) points.
+    solution
+        A solution of its problem.
+    depths
+        (j,) depths below the surface [length], at least half a spacing of the points.
+    body
+        Name of the half-space; by default the lower one, if both bodies are half-spaces.
+
+    Returns
+    -------
+    tuple
+        Stresses (j, n0[, n1], 3, 3) and von Mises stresses (j, n0[, n1]) [stress].
+
+    Raises
+    ------
+    InputError
+        If there is no such half-space, if it is periodic, or if a depth is too small.
+    """
+    found = _half_space(reduction, body)
+    place = reduction.bodies.index(found)
+    force = reduction.maps[place].T @ solution.reactions.ravel()
+    stress = stress_below(found, force[: found.unknowns].reshape(-1, len(found.components)), depths)
+    return stress, von_mises(stress)
+
+
+def _half_space(reduction: Reduction, name: str | None) -> HalfSpaceBody:
+    candidates = [body for body in reduction.bodies if isinstance(body, HalfSpaceBody) and name in (None, body.name)]
+    if not candidates:
+        named = "" if name is None else f" named '{name}'"
+        raise InputError(f"scene '{reduction.scene.name}' has no half-space{named}; this is asked of half-spaces only.")
+    found: HalfSpaceBody = candidates[-1]  # type: ignore[assignment]
+    return found

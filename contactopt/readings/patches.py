@@ -1,0 +1,226 @@
+"""The connected patches of a zone on a contact surface, and the ends at which each of them is read.
+
+On a contact line a patch is a run of neighbouring contacts, in general position: off the origin of the chart, reaching the
+end of the surface, across the seam of a closed curve. On a surface it is a disc about its centre, seen as one end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.chart import ON_PLANE
+from contactopt.readings.constants import RING, ROUNDNESS
+
+SAME = 1e-5  # distances that differ by less than this fraction of an element belong to one ring of nodes
+CENTRE = 1e-12  # relative change of a patch's edges at which its centre is known
+ROUNDS = 20  # of that iteration, which gains about two digits in each
+
+Window = tuple[int, int]  # rings of nodes next to the edge: how many are left out, how many are fitted
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Where a patch begins and ends along its line [length]; `copies` of it make the whole zone.
+
+    step  distance of neighbouring contacts next to its end [length]
+    """
+
+    first: float
+    last: float
+    copies: int
+    uncertainty: float
+    step: float
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """The contacts on one side of a patch's centre, up to the next patch.
+
+    contact   (m,) their indices;  distance  (m,) from the centre [length];  inside  (m,) whether they belong to the patch
+    step      distance of neighbouring nodes next to the edge [length]
+    free      whether the patch ends before the surface does on the other side too: only then are values symmetric about
+              its centre, in the mean, and their squares straight far from the edge
+    """
+
+    contact: np.ndarray
+    distance: np.ndarray
+    inside: np.ndarray
+    step: float
+    free: bool = True
+
+    def inner(self, value: np.ndarray, window: Window) -> float | None:
+        """Where value^2, a line in distance^2 through values (k,) inside, is zero [length]; None if it does not fall."""
+        depth = self.distance[self.inside].max() - self.distance
+        square = self._zero(self.distance**2, value[self.contact] ** 2, self.inside, depth, window)
+        return None if square is None or square <= 0 else float(np.sqrt(square))
+
+    def outer(self, value: np.ndarray, window: Window) -> float | None:
+        """Where value^(2/3), a line in the distance through values (k,) outside, is zero [length]; None as in inner()."""
+        depth = self.distance - self.distance[~self.inside].min()
+        return self._zero(self.distance, value[self.contact] ** (2 / 3), ~self.inside, depth, window)
+
+    def clip(self, edge: float) -> float:
+        """The edge, brought to less than an element from where the nodes say that it is."""
+        last = self.distance[self.inside].max()
+        return float(np.clip(edge, last - self.step / 2, last + 1.5 * self.step))
+
+    def _zero(self, x: np.ndarray, y: np.ndarray, side: np.ndarray, depth: np.ndarray, window: Window) -> float | None:
+        """Where the line through y(x) at the rings in the window on one side is zero; None if it does not fall outwards."""
+        rings = _rings(depth[side], self.step, sum(window))
+        skip = max(0, min(window[0], len(rings) - window[1]))
+        fitted = rings[skip : skip + window[1]]
+        near = side & (depth >= fitted[0] - SAME * self.step) & (depth <= fitted[-1] + SAME * self.step)
+        if np.ptp(depth[near]) <= SAME * self.step:
+            return None
+        slope, height = np.polyfit(x[near], y[near], 1)
+        falls = (slope < 0) == bool(self.inside[near][0])
+        return float(-height / slope) if slope and falls else None
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A patch with the contacts around it, up to the next patch.
+
+    contact   (m,) indices;  place  (m,) along the line, or from the centre of a disc [length];  inside  (m,) mask
+    centred   whether the centre is at the place 0 for sure: on a plane of symmetry, or that of a disc
+    copies    how many images of the patch make the whole zone
+    points    (dim - 1, k) places of all contacts, from which the distance of neighbours is taken
+    """
+
+    contact: np.ndarray
+    place: np.ndarray
+    inside: np.ndarray
+    centred: bool
+    copies: int
+    points: np.ndarray
+
+    def measure(self, read: Callable[[End], tuple[float, float] | None]) -> Ends | None:
+        """The ends of the patch from the readings of each; None where one of them cannot be read.
+
+        An end at the end of the contact surface is the place of the last node. The centre, from which readings count
+        distances, is half-way between the ends, hence the iteration.
+        """
+        x = self.place[self.inside]
+        first, last, uncertainty = float(x.min()), float(x.max()), 0.0
+        if self.centred:
+            found = self._read(1.0, 0.0, read)
+            return None if found is None else Ends(-found[0], found[0], self.copies, found[1], self._step_at(last))
+        for _ in range(ROUNDS):
+            centre = (first + last) / 2
+            left, right = self._read(-1.0, centre, read), self._read(1.0, centre, read)
+            if left is None or right is None:
+                return None
+            before, first, last = (first, last), centre - left[0], centre + right[0]
+            uncertainty = (left[1] + right[1]) / 2
+            if max(abs(first - before[0]), abs(last - before[1])) <= CENTRE * (last - first):
+                break
+        return Ends(first, last, self.copies, uncertainty, self._step_at(last))
+
+    def _step_at(self, edge: float) -> float:
+        return self.step(self.contact, self.place, edge)
+
+    def _read(
+        self, sign: float, centre: float, read: Callable[[End], tuple[float, float] | None]
+    ) -> tuple[float, float] | None:
+        """Distance of one end from the centre and its uncertainty [length]."""
+        distance = sign * (self.place - centre) if not self.centred else np.abs(self.place)
+        # A centre that rounding moves off a node must not take it from either side.
+        side = distance >= -SAME * np.ptp(self.place)
+        contact, distance, inside = self.contact[side], distance[side], self.inside[side]
+        if not inside.any():
+            return None
+        last = float(distance[inside].max())
+        step = self.step(contact, distance, last)
+        if inside.all():
+            return last, step / 2
+        free = self.centred or not bool(self.inside[~side].all())
+        return read(End(contact, distance, inside, step, free))
+
+    def step(self, contact: np.ndarray, distance: np.ndarray, edge: float) -> float:
+        """Distance between neighbouring contacts next to an edge at that distance [length]."""
+        near = contact[np.argsort(np.abs(distance - edge), kind="stable")[:5]]
+        return float(np.median(KDTree(self.points.T).query(self.points.T[near], k=2)[0][:, 1]))
+
+
+def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> list[Patch]:
+    """Find the connected patches of a zone on a contact surface.
+
+    Parameters
+    ----------
+    problem
+        The interface problem of one pair of surfaces.
+    inside
+        (k,) mask of the contacts of the zone: some of them, but not all.
+    weights
+        (k,) weights of the contacts in the mean place that is the centre of a disc.
+
+    Returns
+    -------
+    list
+        The patches in their order along a contact line. On a surface one patch, or none where the zone is no disc.
+    """
+    if problem.dim == 3:
+        disc = _disc(problem, inside, weights)
+        return [] if disc is None else [disc]
+    chart = problem.chart
+    order = chart.order()
+    place, within = chart.places[0, order], inside[order]
+    if chart.period is not None:  # the line begins where the longest way leads through contacts outside
+        begin = _longest_run(~within)
+        place = np.concatenate([place[begin:], place[:begin] + chart.period])
+        order, within = np.roll(order, -begin), np.roll(within, -begin)
+    starts = np.flatnonzero(within & ~np.append(False, within[:-1]))
+    stops = np.flatnonzero(within & ~np.append(within[1:], False))
+    found = []
+    for i in range(len(starts)):
+        part = slice(stops[i - 1] + 1 if i else 0, starts[i + 1] if i + 1 < len(starts) else len(order))
+        reaches = chart.mirrored[0] and _reaches_origin(place, place[starts[i] : stops[i] + 1])
+        copies = 1 if reaches or not chart.mirrored[0] else 2
+        found.append(Patch(order[part], place[part], within[part], reaches, copies, chart.places))
+    return found
+
+
+def _reaches_origin(place: np.ndarray, patch: np.ndarray) -> bool:
+    """Whether a patch and its mirror image are one: no contact lies between them, but for one on the plane itself.
+
+    The contact on an axis of revolution has no area, hence perhaps no force, and does not divide them.
+    """
+    plane = ON_PLANE * np.abs(place).max()
+    off_plane = np.abs(place[np.abs(place) > plane])
+    touches = np.abs(place).min() <= plane
+    return bool(touches and (np.abs(patch).min() <= plane or np.abs(patch).min() <= off_plane.min()))
+
+
+def _longest_run(mask: np.ndarray) -> int:
+    """Index in the middle of the longest run of true values around a closed line."""
+    n = len(mask)
+    length, best, middle = 0, 0, 0
+    for i, value in enumerate(np.concatenate([mask, mask])):
+        length = length + 1 if value else 0
+        if best < length <= n:
+            best, middle = length, (i - length // 2) % n
+    return middle
+
+
+def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> Patch | None:
+    """The contacts inside as a disc about their centre of gravity; None where they are no disc."""
+    x = problem.chart.places
+    centre = (x[:, inside] @ weights[inside]) / weights[inside].sum()
+    centre = np.where(problem.chart.mirrored, 0.0, centre)
+    distance = np.linalg.norm(x - centre[:, None], axis=0)
+    disc = Patch(np.arange(problem.contacts), distance, inside, True, 1, x)
+    step = disc.step(disc.contact, distance, float(distance[inside].max()))
+    return disc if abs(distance[~inside].min() - distance[inside].max()) <= ROUNDNESS * step else None
+
+
+def _rings(depth: np.ndarray, step: float, count: int) -> list[float]:
+    """The least depths, at most `count`, each about a step or more beyond the one before."""
+    rings = [float(depth.min())]
+    while len(rings) < count and np.any(beyond := depth > rings[-1] + RING * step):
+        rings.append(float(depth[beyond].min()))
+    return rings

@@ -1,0 +1,342 @@
+"""Quantities at a place that the user names: stress at a point or its maximum in a region, pressure at a point.
+
+    von_mises:BODY                     largest von Mises stress in a body [stress]
+    von_mises:BODY:BOUNDARY            on one of its named boundaries, such as a fillet
+    von_mises:BODY@X,Y,radius=R        in the circle or ball around a point
+    von_mises:BODY@X,Y                 at a point, in space @X,Y,Z
+    stress_xx:BODY@X,Y                 a component there: stress_xx, stress_xy, ..., named as in the VTU files
+    pressure@X,Y, pressure:PAIR@X,Y    contact pressure at the place of a surface that is nearest to the point
+
+Stresses are recovered ones (contactopt.bodies.stress_recovery). The largest one is that at the vertices of the mesh and, in a circle,
+at its centre. Near a place a pressure is the linear function that fits the nearest contacts best, with their areas as weights.
+Each reading comes with its slopes, the derivatives by what it was read from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from contactopt.bodies.protocol import Region
+from contactopt.coupling.reduction import Reduction
+from contactopt.errors import InputError
+from contactopt.meshes.cells import straight
+from contactopt.problem import Solution
+from contactopt.readings.constants import MOST_PEAKS
+from contactopt.readings.quantities import Peak, Reading
+from contactopt.scenes.scene import Part, Scene
+
+if TYPE_CHECKING:
+    from contactopt.bodies.stress_recovery import StressMap
+
+LARGEST = "von_mises"
+OUTSIDE = 0.05  # how far beyond the coordinates of a body a point may lie before anything is solved, over its size
+DEVIATIONS = 2  # standard errors of a fit that a stress may be off: 95 of 100 are within two
+RIVAL = 0.5  # of the largest scatter, which the places need that are to be looked at more closely
+AROUND = {2: 9, 3: 17}  # vertices among which a local maximum is the largest, itself among them
+NEAREST = {2: 4, 3: 8}  # contacts through which the pressure near a place is fitted
+PLACED = ("von_mises:BODY", "von_mises:BODY:BOUNDARY", "von_mises:BODY@X,Y", "stress_xx:BODY@X,Y", "pressure@X,Y")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A quantity at a place, by the parts of its name.
+
+    kind  'von_mises', 'pressure', or the component of a stress;   owner  body, or pair of surfaces;   region  where
+    """
+
+    name: str
+    kind: str
+    owner: str
+    region: Region
+
+
+@dataclass(frozen=True, eq=False)
+class StressReading:
+    """A stress, and what it was read from.
+
+    value  [stress]
+    uncertainty  by how much it may be off because stresses scatter from element to element [stress]
+    peaks  where it is, with the elements where the stress may be larger than the value or is as uncertain as it; of a
+           largest stress then its other local maxima
+    body   its number among the parts of the scene;   map, slopes (m, 4 or 6)  of the recovered stress, for its derivative
+    """
+
+    value: float
+    uncertainty: float
+    peaks: tuple[Peak, ...] = field(repr=False)
+    body: int
+    map: StressMap = field(repr=False)
+    slopes: np.ndarray = field(repr=False)
+
+
+def place_of(name: Any, scene: Scene) -> Place | None:
+    """Find the quantity at a place that has a name.
+
+    Parameters
+    ----------
+    name
+        The name of any quantity.
+    scene
+        The scene that is asked.
+
+    Returns
+    -------
+    Place or None
+        None for the names of other quantities.
+
+    Raises
+    ------
+    InputError
+        For a body, pair, component or point that the scene does not have.
+    """
+    from contactopt.bodies.fields import STRESSES
+
+    if not isinstance(name, str):
+        return None
+    head, at, where = name.partition("@")
+    kind, _, rest = head.partition(":")
+    if kind == "pressure" and at:
+        pairs = [pair.name for pair in scene.pairs]
+        if rest not in pairs and (rest or len(pairs) > 1):
+            raise InputError(f"quantity {name!r}: name one pair of surfaces, as in 'pressure:{pairs[0]}@...'.")
+        return Place(name, kind, rest, _around(name, where, scene))
+    stress = kind.removeprefix("stress_")
+    if kind != LARGEST and stress == kind:
+        return None
+    body, _, boundary = rest.partition(":")
+    known = [part.name for part in scene.parts if isinstance(part, Part)]
+    if body not in known:
+        raise InputError(
+            f"quantity {name!r}: there is no elastic body {body!r} with a mesh; choose from {', '.join(known)}."
+        )
+    if kind != LARGEST and stress not in STRESSES[scene.kind]:
+        names = ", ".join(f"stress_{own}" for own in STRESSES[scene.kind])
+        raise InputError(f"quantity {name!r}: there is no stress {kind!r}; choose from {names} and von_mises.")
+    region = _around(name, where, scene) if at else Region(boundary)
+    if kind != LARGEST and (not at or region.radius is not None):
+        raise InputError(f"quantity {name!r}: a component of the stress is read at a point, as in '{kind}:{body}@1,2'.")
+    if boundary and at:
+        raise InputError(f"quantity {name!r}: give either a boundary or a point.")
+    part = next(part for part in scene.parts if isinstance(part, Part) and part.name == body)
+    _check_there(part, region, scene)
+    return Place(name, kind if kind == LARGEST else stress, body, region)
+
+
+def _check_there(part: Part, region: Region, scene: Scene) -> None:
+    """InputError for a boundary that the first mesh of a body does not have, and for a point far outside it."""
+    if not region.boundary and not region.point:
+        return
+    mesh = part.build_mesh(scene.elements, scene.zone)
+    known = mesh.boundaries or {}
+    if region.boundary and region.boundary not in known:
+        raise InputError(
+            f"body '{part.name}' has no boundary {region.boundary!r}; it has {', '.join(sorted(known)) or 'none'}."
+        )
+    if region.point:
+        corners = straight(mesh).p
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        slack = OUTSIDE * (high - low).max() + (region.radius or 0.0)
+        if np.any(region.point < low - slack) or np.any(region.point > high + slack):
+            place = ", ".join(f"{x:g}" for x in region.point)
+            raise InputError(
+                f"the point ({place}) lies outside body '{part.name}'; give one inside it or on its surface."
+            )
+
+
+def _around(name: str, where: str, scene: Scene) -> Region:
+    """The point, or the circle around it, that stands behind the @ of a quantity."""
+    texts = where.split(",")
+    try:
+        radius = float(texts.pop().strip().removeprefix("radius=")) if texts[-1].strip().startswith("radius=") else None
+        point = tuple(float(text) for text in texts)
+    except ValueError:
+        point, radius = (), None
+    if len(point) != scene.dim or not np.all(np.isfinite(point)) or (radius is not None and not 0 < radius < np.inf):
+        example = ",".join(scene.components)
+        raise InputError(f"quantity {name!r}: a place needs {scene.dim} numbers, @{example} or @{example},radius=R.")
+    return Region(point=point, radius=radius)
+
+
+def read_stress(place: Place, reduction: Reduction, displaced: tuple[np.ndarray, ...]) -> StressReading:
+    """Read the stress that a quantity names.
+
+    Parameters
+    ----------
+    place
+        The quantity.
+    reduction
+        The reduced scene.
+    displaced
+        For each body its displacement U (n,) [length].
+
+    Returns
+    -------
+    StressReading
+        The value, where it is, and by how much it may be off.
+
+    Raises
+    ------
+    InputError
+        For a boundary that the body does not have, a point outside the body, and a body on another rank.
+    """
+    from contactopt.bodies.fields import STRESSES
+    from contactopt.bodies.stress_recovery import von_mises, von_mises_slopes
+
+    number = [part.name for part in reduction.scene.parts].index(place.owner)
+    recovered = map_of(place, reduction)
+    stress = recovered.stress(displaced[number])
+    if place.kind == LARGEST:
+        sizes, slopes = von_mises(stress), von_mises_slopes(stress)
+    else:
+        column = STRESSES[reduction.scene.kind].index(place.kind)
+        sizes, slopes = stress[:, column], np.zeros(stress.shape)
+        slopes[:, column] = 1.0
+    top = int(np.argmax(sizes))
+    scatter = DEVIATIONS * recovered.deviation(displaced[number], slopes)
+    above = sizes + scatter - sizes[top]
+    doubtful = (above > 0) & (scatter >= RIVAL * scatter[above > 0].max(initial=0.0))
+    slopes[np.arange(len(slopes)) != top] = 0.0
+    uncertainty = float(above.max())
+    others = [i for i in _tops(recovered.places, sizes) if i != top] if place.kind == LARGEST else []
+    nothing = np.empty(0, dtype=int)
+    peaks = [
+        Peak(
+            float(sizes[i]),
+            uncertainty if i == top else float(scatter[i]),
+            recovered.places[:, i],
+            recovered.size(i),
+            nothing,
+            number,
+            recovered.elements(np.flatnonzero(doubtful) if i == top else np.array([i])),
+        )
+        for i in (top, *others)
+    ]
+    return StressReading(float(sizes[top]), uncertainty, tuple(peaks), number, recovered, slopes)
+
+
+def _tops(places: np.ndarray, sizes: np.ndarray) -> list[int]:
+    """Numbers of the places (dim, m) where a size (m,) is that of no neighbour exceeded, the largest of them first."""
+    count = min(AROUND[len(places)], len(sizes))
+    near = cKDTree(places.T).query(places.T, k=count)[1].reshape(len(sizes), count)
+    chosen = np.flatnonzero(sizes >= sizes[near].max(axis=1))
+    order = np.argsort(-sizes[chosen], kind="stable")[:MOST_PEAKS]
+    return [int(i) for i in chosen[order]]
+
+
+def map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> StressMap:
+    """Make the recovered stress in the region of a quantity a linear map of the displacement.
+
+    Parameters
+    ----------
+    place
+        The quantity.
+    reduction
+        The reduced scene.
+    by_poisson
+        Whether the derivative of the map by Poisson's ratio is wanted instead.
+
+    Returns
+    -------
+    StressMap
+        The map.
+
+    Raises
+    ------
+    InputError
+        Where the stress of the body cannot be read, as on another rank.
+    """
+    number = [part.name for part in reduction.scene.parts].index(place.owner)
+    recovered = reduction.bodies[number].stress_map(place.region, by_poisson)
+    if recovered is None:
+        raise InputError(f"quantity {place.name!r}: the stress inside body '{place.owner}' cannot be read here.")
+    return recovered
+
+
+def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
+    """Compute what the force at each contact contributes to the pressure at a place.
+
+    Parameters
+    ----------
+    place
+        The quantity.
+    reduction
+        The reduced scene.
+
+    Returns
+    -------
+    (k, dim) array
+        The contributions [1 / length^2].
+    """
+    problem = reduction.problem
+    pairs = {pair.name: pair for pair in problem.pairs}
+    own = np.zeros(problem.contacts, dtype=bool)
+    own[pairs[place.owner].contacts if place.owner else slice(None)] = True
+    own &= problem.areas > 0
+    chosen = np.flatnonzero(own)
+    offset = problem.coordinates[:, chosen] - np.asarray(place.region.point)[:, None]
+    near = np.argsort(np.linalg.norm(offset, axis=0), kind="stable")[: NEAREST[problem.dim]]
+    tangents = reduction.frames[chosen[near[0]], 1:]
+    along = tangents @ offset[:, near]
+    terms = np.concatenate([np.ones((1, len(near))), along / (np.abs(along).max() or 1.0)])
+    root = np.sqrt(problem.areas[chosen[near]])
+    weights = np.zeros(problem.q.shape)
+    weights[chosen[near], 0] = np.linalg.pinv((terms * root).T)[0] * root / problem.areas[chosen[near]]
+    return weights
+
+
+def read_place(place: Place, reduction: Reduction, solution: Solution) -> Reading:
+    """Read a quantity at a place, with its uncertainty [stress].
+
+    The uncertainty of a pressure is what the nodal values scatter about the linear function through them.
+
+    Parameters
+    ----------
+    place
+        The quantity.
+    reduction
+        The reduced scene.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    Reading
+        The stress or the pressure. Where no contact near the place touches, it says that there is no pressure.
+
+    Raises
+    ------
+    InputError
+        As read_stress() and pressure_weights().
+    """
+    if place.kind != "pressure":
+        found = read_stress(place, reduction, reduction.displaced(solution))
+        return Reading(found.value, found.uncertainty, found.peaks)
+    weights, problem = pressure_weights(place, reduction), reduction.problem
+    near = np.flatnonzero(weights[:, 0])
+    value = float(np.sum(weights * solution.reactions))
+    pressure = solution.reactions[near, 0] / problem.areas[near]
+    missing = ""
+    if not problem.law.pressed(solution.reactions)[near].any():
+        point = ", ".join(f"{x:g}" for x in place.region.point)
+        apart = problem.displacements(solution.reactions, solution.multipliers)[near, 0].min()
+        missing = f"there is no contact at ({point}): the surfaces are {apart:.3g} apart there"
+    share = weights[near, 0] * problem.areas[near]
+    scatter = (
+        float(np.abs(pressure - value) @ np.abs(share))
+        if len(near) < 3
+        else float(np.sqrt(np.sum(_left(problem.coordinates[:, near], pressure) ** 2) * np.sum(share**2)))
+    )
+    noise = solution.residual * float(np.linalg.norm(solution.reactions) / problem.areas[near].min())
+    at = problem.coordinates[:, near[0]]
+    size = float(np.ptp(problem.coordinates[:, near], axis=1).max())
+    return Reading(value, scatter + noise, (Peak(value, scatter, at, size, near),), missing)
+
+
+def _left(points: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """What a linear function through values (m,) at points (dim, m) leaves of them."""
+    terms = np.vstack([np.ones(points.shape[1]), points - points.mean(axis=1, keepdims=True)]).T
+    return np.asarray(values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0])

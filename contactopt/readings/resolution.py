@@ -1,0 +1,87 @@
+"""Whether the mesh resolves the contact at all: remarks for people, on answers whose certificate says nothing of the mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contactopt.coupling.reduction import Reduction
+from contactopt.problem import Solution
+from contactopt.problem.contact_status import contact_status
+from contactopt.readings.resultants import views
+
+FEWEST = (
+    4  # elements across the half-width of contact; with so few the largest pressure is some percent off (reports/hertz)
+)
+COVERED = 0.99  # a contact with less than this share of its faces lies where the other surface ends
+
+
+def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
+    """Tell of zones of contact that are smaller than the mesh can show, or reach the other surface's rim.
+
+    A zone that ends by itself and has fewer contacts than a disc or strip of FEWEST elements across its half-width is told.
+    A surface that touches as a whole has no such zone. Contacts at the
+    rim of the other surface are told, since only a part of their faces bears the force.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    tuple of str
+        Full sentences; empty if every zone is resolved, and for solutions that are not certified.
+    """
+    if not solution.solved:
+        return ()
+    few = [
+        f"too few contacts of '{name}' touch, {len(own)} of {count}, to show how the pressure is distributed: "
+        "refine the meshes there, or ask for an accuracy."
+        for (name, count), own in coarse(reduction, solution)
+    ]
+    return (*few, *_at_rims(reduction, solution))
+
+
+def _at_rims(reduction: Reduction, solution: Solution) -> list[str]:
+    """Sentences on contacts that touch where the other surface ends and covers a part of their faces."""
+    found = []
+    for (view, own), coupling in zip(views(reduction, solution), reduction.couplings):
+        touches = contact_status(view.problem, own.reactions).touching
+        if coupling.share is None or not np.any(rim := touches & (coupling.share < COVERED)):
+            continue
+        least = np.argmin(np.where(rim, coupling.share, 1.0))
+        where = ", ".join(f"{c:.4g}" for c in coupling.positions[:, least])
+        found.append(
+            f"{rim.sum()} contacts of '{view.problem.pairs[0].name}' touch at the rim of the other surface, "
+            f"which covers only a part of their faces, as little as {coupling.share[least]:.0%} near ({where}): "
+            "their pressure is the force over that part."
+        )
+    return found
+
+
+def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, int], np.ndarray]]:
+    """Find the pairs of surfaces whose zone of contact is smaller than the mesh can show.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene.
+    solution
+        Of its problem.
+
+    Returns
+    -------
+    list
+        Name and number of contacts of each such pair, with the numbers of those that touch.
+    """
+    found = []
+    for (view, own), pair in zip(views(reduction, solution), reduction.problem.pairs):
+        problem = view.problem
+        touching = np.flatnonzero(contact_status(problem, own.reactions).touching)
+        images = 2 ** int(np.sum(problem.chart.mirrored))
+        strip = 2 * FEWEST if problem.dim == 2 else np.pi * FEWEST**2
+        if 0 < len(touching) < problem.contacts and len(touching) * images < strip:
+            found.append(((pair.name, problem.contacts), touching + pair.start))
+    return found

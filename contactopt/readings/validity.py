@@ -1,0 +1,102 @@
+"""Whether an answer lies within what is assumed: small displacements, and bodies in equilibrium.
+
+The certificate says that the forces solve the interface problem. What is compared here with the bounds of the table below is
+computed from the displacements of the bodies alone, without the factors that made the interface problem.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from contactopt.coupling.reduction import Reduction
+from contactopt.problem import Solution
+from contactopt.problem.contact_status import contact_status
+
+# The largest values that draw no remark.
+BOUNDS = {
+    "strain": 0.05,  # of an element, beyond which a stiffness of small strains is some percent off
+    "rotation": 0.1,  # of an element [rad]: its square, half a percent, is the strain that it seems to make
+    "slip": 1.0,  # over the size of the facets there: contacts have moved past their partners
+    "closure": 1.0,  # of the gap, over the size of the facets there
+    "imbalance": 1e-6,  # of a body, relative to the forces on it
+    "misfit": 1e-3,  # of the surfaces of the displaced bodies where they touch, relative to their displacement
+}
+SHARE = 0.02  # of the extent of a surface, up to which a closed gap is small, however fine its facets are
+UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facets"}
+
+
+def _sizes(cells: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(k,) longest edge of the cells around each contact [length]; infinite where there are none."""
+    size = np.zeros(points.shape[1])
+    for own, other in zip(cells, np.roll(cells, 1, axis=0)):
+        length = np.linalg.norm(points[:, own] - points[:, other], axis=0)
+        np.maximum.at(size, own, length)
+        np.maximum.at(size, other, length)
+    return np.where(size > 0, size, np.inf)
+
+
+def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], list[str]]:
+    """Measure how far an answer goes beyond what is assumed.
+
+    Parameters
+    ----------
+    reduction
+        A reduced scene.
+    solution
+        A solution of its problem.
+
+    Returns
+    -------
+    tuple
+        The table `bodies` of a summary, with the imbalance, strain and rotation of every body, and that of the pairs,
+        with slip and closure over the size of the facets and the misfit; and one sentence for every value beyond its
+        bound.
+    """
+    displaced, reactions = reduction.displaced(solution), solution.reactions.ravel()
+    bodies: dict[str, dict[str, float]] = {}
+    remarks: list[str] = []
+    moved = reduction.seen(displaced)
+    scale = np.zeros(len(moved))
+    for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
+        known = bodies[body.name] = body.limits(U, B.T @ reactions)._asdict()
+        remarks += [_beyond(key, f"body '{body.name}'", known[key]) for key in ("strain", "rotation")]
+        if known["imbalance"] > BOUNDS["imbalance"]:
+            remarks.append(
+                f"body '{body.name}' is not in equilibrium: {known['imbalance']:.1e} of the forces on it are left over; it is "
+                "so thin or so weakly held that rounding moves it."
+            )
+        near = np.diff(B.indptr).reshape(moved.shape).any(axis=1)  # the contacts that the body takes part in
+        size = np.linalg.norm(body.seen(B, U).reshape(moved.shape), axis=1)
+        scale = np.maximum(scale, np.where(near, np.maximum(size, known["moved"]), 0.0))
+    status, pairs = contact_status(reduction.problem, solution.reactions), {}
+    for pair, made in zip(reduction.problem.pairs, reduction.couplings):
+        own, touching = pair.contacts, status.touching[pair.contacts]
+        size = _sizes(made.cells, made.positions)
+        extent = float(np.ptp(made.positions, axis=1).max(initial=0.0))
+        slip = np.linalg.norm(moved[own, 1:], axis=1) / size
+        closure = np.where(made.gap > SHARE * extent, made.gap / size, 0.0)
+        close = status.stick[own] if reduction.problem.law.dilatant else touching  # the others open as they slip
+        misfit = np.abs(moved[own, 0])[close].max(initial=0.0) / max(scale[own].max(initial=0.0), 1e-300)
+        found = {"slip": slip, "closure": closure}
+        pairs[pair.name] = {key: float(value[touching].max(initial=0.0)) for key, value in found.items()}
+        remarks += [_beyond(key, f"pair '{pair.name}'", value) for key, value in pairs[pair.name].items()]
+        pairs[pair.name]["misfit"] = float(misfit)
+        if solution.solved and misfit > BOUNDS["misfit"]:
+            remarks.append(
+                f"where the surfaces of '{pair.name}' touch, the displaced bodies miss each other by {misfit:.1e} of their "
+                "displacement: a body is so thin or so weakly held that rounding moves it."
+            )
+    return {"bodies": bodies, "pairs": pairs}, [remark for remark in remarks if remark]
+
+
+def _beyond(key: str, where: str, value: float) -> str:
+    """The sentence for a value beyond its bound, or an empty text."""
+    if value <= BOUNDS[key]:
+        return ""
+    what = {"slip": "slips by up to", "closure": "closes a gap of up to"}.get(key, f"has a {key} of up to")
+    return (
+        f"displacements are assumed to be small, but {where} {what} {value:.3g}{UNITS[key]}, more than "
+        f"{BOUNDS[key]:g}: read the answer as a first step at most."
+    )

@@ -1,0 +1,97 @@
+"""Scenes whose meshes are halved everywhere, with curved boundaries kept curved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from contactopt.meshes.local_refinement import Curve, Function, boundary_curves, split
+from contactopt.scenes.scene import Part, Scene
+
+STEPS = 8  # of the iteration that keeps a coordinate
+
+
+def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
+    """Put a scene on the meshes made for `elements` and then halved several times.
+
+    New nodes lie on the `curve` of their part, or on the curve that the first mesh stands for.
+
+    Parameters
+    ----------
+    scene
+        The scene, which stays as it is.
+    elements
+        Number across the contact half-width, for which the meshes are made.
+    splits
+        How often they are halved.
+
+    Returns
+    -------
+    Scene
+        The scene with these meshes, whatever number of elements it is asked for.
+    """
+
+    def finer(part: Any) -> Any:
+        if not isinstance(part, Part):
+            return part
+
+        def mesh(_: int, zone: float | None) -> Any:
+            made = part.build_mesh(elements, zone)
+            curves: dict[str, Function] = dict(part_curves(part, made))
+            touching = {name: curves[name] for name in scene.surfaces_of(part) if name in curves}
+            if callable(part.mesh):  # what moves first stays where it is on other boundaries of the same curve
+                kept = {name: _kept_partners(curve, made, name) for name, curve in touching.items()}
+                curves = kept | {name: curve for name, curve in curves.items() if name not in kept}
+            for _ in range(splits):
+                made = split(made, curves)
+            return made
+
+        return replace(part, mesh=mesh)
+
+    return scene.with_parts(finer) if splits else scene
+
+
+def part_curves(part: Part, mesh: Any) -> dict[str, Curve]:
+    """Find the curves of all curved boundaries of a part.
+
+    Parameters
+    ----------
+    part
+        The part.
+    mesh
+        Its mesh.
+
+    Returns
+    -------
+    dict
+        By the name of a boundary its curve: the one that the part gives, or that of the mesh. The name '' stands for
+        what has no name.
+    """
+    found = {name: part.curve_of(name) or curve for name, curve in boundary_curves(mesh).items()}
+    return {name: curve for name, curve in found.items() if curve is not None}
+
+
+def _kept_partners(curve: Function, mesh: Any, name: str) -> Function:
+    """A curve along which points keep one coordinate, so that the nodes of two bodies match.
+
+    Where the boundary turns away from this coordinate by more than 45 degrees the curve stays as it is.
+    """
+    if len(mesh.p) != 2:
+        return curve
+    ends = mesh.p[:, mesh.facets[:, mesh.boundaries[name]]]
+    along = int(np.argmax(np.ptp(ends.reshape(2, -1), axis=1)))
+    edge = np.abs(ends[:, 1] - ends[:, 0])
+    if np.any(edge[1 - along] > edge[along]):
+        return curve
+
+    def place(points: np.ndarray) -> np.ndarray:
+        here = points.copy()
+        for _ in range(STEPS):
+            found = curve(here)
+            here[along] += points[along] - found[along]
+        found[along] = points[along]
+        return found
+
+    return place

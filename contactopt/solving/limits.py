@@ -1,0 +1,61 @@
+"""Bounds on what a search for an accuracy may take, and the sentences that say which of them ended it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contactopt.checks import check_number
+from contactopt.readings.constants import MOST_MEMORY
+
+GIGABYTE = 1e9
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds on the meshes of a search; the first mesh is always solved.
+
+    unknowns  of the displacement on one mesh; None: those of the search
+    seconds   wall time of the whole search [s]
+    memory    that the meshes take [GB]
+    """
+
+    unknowns: int | None = None
+    seconds: float = np.inf
+    memory: float = MOST_MEMORY / GIGABYTE
+
+    def __post_init__(self) -> None:
+        if self.unknowns is not None:
+            check_number("max_unknowns", self.unknowns, low=1.0)
+        if self.seconds != np.inf:
+            check_number("time_limit", self.seconds, low=0.0, closed=True)
+        check_number("max_memory", self.memory, low=0.0)
+
+    def refusal(self, unknowns: float, usual: int, seconds: float, memory: float) -> str:
+        """Say which bound the next mesh would pass.
+
+        Parameters
+        ----------
+        unknowns
+            Unknowns that it would have.
+        usual
+            The bound on them where none was given.
+        seconds
+            Time that the search would have taken at its end [s].
+        memory
+            Memory that would be held at its end [bytes].
+
+        Returns
+        -------
+        str
+            One sentence; an empty text if the mesh passes no bound.
+        """
+        most = usual if self.unknowns is None else self.unknowns
+        if unknowns > most:
+            return f"to go on would take up to {unknowns:,.0f} unknowns, more than {most:,}"
+        if seconds > self.seconds:
+            return f"to go on would take about {seconds:.2g} s in all, more than the time limit of {self.seconds:g} s"
+        if memory > self.memory * GIGABYTE:
+            return f"to go on would take about {memory / GIGABYTE:.2g} GB of memory, more than {self.memory:g} GB"
+        return ""

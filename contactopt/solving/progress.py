@@ -1,0 +1,98 @@
+"""One line per outer iteration of a solve that takes long: what it has reached, what it took, what is left."""
+
+from __future__ import annotations
+
+import math
+import resource
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from contactopt.linear.operators import InterfaceOperator
+from contactopt.problem import InterfaceProblem
+
+PATIENCE = 5.0  # seconds of a solve about which nothing is said
+
+
+def progress_lines(say: Callable[[str], None], problem: InterfaceProblem, tol: float) -> Callable[[int, float], None]:
+    """Make a function for the `progress` of contactopt.solve that says a line for each outer iteration.
+
+    It says nothing before the solve has taken PATIENCE seconds. A line gives the residual, the V-cycles where the
+    method works on the bodies themselves, the time, the largest memory of the process so far, and the time that is left
+    if the residual goes on falling as it fell in the last iteration.
+
+    Parameters
+    ----------
+    say
+        A function that receives each line.
+    problem
+        The interface problem that is solved.
+    tol
+        The residual at which the solve will end.
+
+    Returns
+    -------
+    callable
+        A function of the number of the iteration and of its residual.
+    """
+    begin = time.perf_counter()
+    before: list[tuple[float, float]] = []
+    form = problem.Q.coupled if isinstance(problem.Q, InterfaceOperator) else None
+    first = 0 if form is None else form.cycles
+
+    def progress(iteration: int, residual: float) -> None:
+        spent = time.perf_counter() - begin
+        before.append((spent, residual))
+        if spent < PATIENCE:
+            return
+        cycles = "" if form is None else f", {form.cycles - first} V-cycles of each body"
+        say(
+            f"step {iteration}: residual {residual:.1e}{cycles}, {spent:.0f} s, {_peak_memory() / 2**30:.1f} GiB"
+            + remaining(before, tol)
+        )
+
+    return progress
+
+
+def remaining(steps: list[tuple[float, float]], tol: float) -> str:
+    """Say how much time is left, from the last two steps of a solve.
+
+    Parameters
+    ----------
+    steps
+        The seconds spent [s] and the residual after each step.
+    tol
+        The residual at which the solve will end.
+
+    Returns
+    -------
+    str
+        ", about T s left"; nothing where the residual did not fall or is small enough.
+    """
+    if len(steps) < 2:
+        return ""
+    (start, old), (end, new) = steps[-2:]
+    if not 0 < tol < new < old:
+        return ""
+    return f", about {(end - start) * math.log(new / tol) / math.log(old / new):.0f} s left"
+
+
+def _peak_memory() -> float:
+    """Largest memory of this process so far in bytes."""
+    size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return float(size if sys.platform == "darwin" else 1024 * size)
+
+
+def resident_memory() -> float:
+    """Read how much memory this process takes now.
+
+    Returns
+    -------
+    float
+        Bytes; 0 where the system does not tell.
+    """
+    try:
+        return float(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+    except OSError:
+        return 0.0

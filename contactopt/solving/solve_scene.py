@@ -1,0 +1,210 @@
+"""The one place that solves a scene: reduce it to its interface, find a start, solve.
+
+Whatever solves scenes is a loop around the two functions of this module. solve_scene() begins with a scene. solve_loaded() goes
+on with the same bodies under other loads. contactopt.solving.zone remeshes to the contact zone, contactopt.solving.paths
+follows a load path, and contactopt.accuracy refines meshes around both.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contactopt.coupling.reduction import Reduction, reduce_bodies
+from contactopt.errors import InputError
+from contactopt.linear.convolution import Convolution
+from contactopt.linear.operators import InterfaceOperator
+from contactopt.methods.driver import solve
+from contactopt.methods.method import Method
+from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem.transfer import transfer
+from contactopt.readings.constants import BALANCED, BEARABLE, COARSEST, FACTOR, ROUGH, ROUNDS, SLOW
+from contactopt.readings.validity import validity
+from contactopt.scenes.scene import Scene
+from contactopt.solving.progress import progress_lines
+
+if TYPE_CHECKING:
+    from contactopt.solving.paths import PathResult
+
+Note = Callable[[str], None]
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Options:
+    """How scenes are solved, whatever loop goes around it.
+
+    Attributes
+    ----------
+    Q : form of the interface operator, as for contactopt.reduce
+    solver : of the bodies' linear systems, as for contactopt.reduce
+    method : as for contactopt.solve
+    tol : bound on the natural-map residual
+    settings : further arguments of contactopt.solve: limits, and settings of a method that is given by its name
+    note : receives one short sentence before every step that takes time, and in long solves one after each iteration
+    """
+
+    Q: str = "auto"
+    solver: str = "auto"
+    method: str | Method | None = None
+    tol: float = 1e-8
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    note: Note = lambda text: None
+
+    @property
+    def of_solve(self) -> dict[str, Any]:
+        """The arguments of contactopt.solve."""
+        return {"method": self.method, "tol": self.tol} | dict(self.settings)
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A scene that was reduced and solved.
+
+    `solution.seconds` holds the wall time [s] of each phase, summed over all that led to this solution: `assemble`,
+    `factorise` and `compliance` of the bodies, `load` of further states of a path, `solve` of the interface problem by
+    the method, and `coarse` for everything that was done on coarser meshes.
+
+    zones  half-widths of the contact zone [length]: for which the first mesh was made, and read from each solution; none
+           if the scene has no zone
+    path   all states of a load path, of which this is the last one; None where there is one state only
+    """
+
+    reduction: Reduction
+    solution: Solution
+    zones: tuple[float, ...] = ()
+    path: PathResult | None = None
+
+
+def solve_scene(
+    scene: Scene,
+    elements: int | None = None,
+    zone: float | None = None,
+    options: Options | None = None,
+    start: Solved | None = None,
+) -> Solved:
+    """Reduce a scene on one mesh and solve it.
+
+    Parameters
+    ----------
+    scene
+        What to solve.
+    elements
+        Number across the contact half-width; the scene's own number by default.
+    zone
+        Half-width of contact that the mesh resolves [length]; the scene's first guess by default.
+    options
+        How to solve it.
+    start
+        The same scene solved on another mesh, to start from. Without one, where Newton's steps take products with Q,
+        the scene is first solved on a coarser mesh, if its bodies can make one.
+
+    Returns
+    -------
+    Solved
+        The reduction and its solution. The solution says itself whether it is certified.
+
+    Raises
+    ------
+    InputError
+        On a scene that cannot be modelled, or options that do not fit.
+    """
+    options = options or Options()
+    if not isinstance(scene, Scene):
+        raise InputError(f"a scene must be a Scene; got {type(scene).__name__}.")
+    elements = scene.elements if elements is None else elements
+    options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
+    reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver)
+    coarse: dict[str, float] = {}
+    operator = reduction.problem.Q
+    products = isinstance(operator, InterfaceOperator) and operator.coupled is None
+    products = products and not isinstance(operator, Convolution)  # half-spaces have coarse grids of their own
+    coarser = elements // FACTOR[scene.dim]
+    if start is None and products and not scene.given and coarser >= COARSEST:
+        begin = time.perf_counter()
+        start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
+        coarse = {"coarse": time.perf_counter() - begin}
+    options.note(f"solving {reduction.problem.contacts} contacts")
+    first = None if start is None else transfer(start.reduction.problem, start.solution, reduction.problem)
+    solved = _solved(reduction, first, options, coarse)
+    log.info("%s: %d elements, %s", scene.name, elements, solved.solution.status)
+    return solved
+
+
+def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Options) -> Solved:
+    """Solve the next state of a load path: the same bodies, coupling and Q under other loads.
+
+    Parameters
+    ----------
+    scene : the state, which differs from the one before in its loads only
+    before : the state before, whose solution is the start
+    slipped : (k, dim - 1) tangential displacements of the contacts in the state before, from which slip is measured [length]
+    options : how to solve it; the form of Q and the bodies' solvers stay those of `before`
+
+    Returns
+    -------
+    Solved : whose problem is that of this step alone
+
+    Raises
+    ------
+    InputError : if more than loads and friction differ
+    """
+    reduction = before.reduction.loaded(scene)
+    q = reduction.problem.q.copy()
+    q[:, 1:] -= slipped
+    step = replace(reduction, problem=replace(reduction.problem, q=q))
+    return _solved(step, before.solution, options, {})
+
+
+def _solved(reduction: Reduction, start: Solution | None, options: Options, earlier: Mapping[str, float]) -> Solved:
+    """The solution of a reduced scene, with the seconds of the reduction, of the solve and of what came earlier."""
+    lines = progress_lines(options.note, reduction.problem, options.tol)
+
+    def answer(problem: InterfaceProblem, start: Solution | None) -> Solution:
+        return solve(problem, start=start, **({"progress": lines} | options.of_solve))
+
+    seconds = Counter(reduction.seconds)
+    seconds.update(earlier)
+    held = reduction.grounded()
+    found = [] if held is None else [_on_ground(held, start, answer)]
+    if not found or _doubt(*found[0]) > BALANCED:
+        try:
+            found.append((reduction, answer(reduction.problem, start)))
+        except InputError:  # so thin that its compliance is rounding alone
+            if not found:
+                raise
+    for _, solution in found:
+        seconds.update(solution.seconds)
+    # What bends by itself needs no ground, however far its surfaces miss each other without it.
+    doubts = [0.0] if len(found) == 1 else [_doubt(*pair) for pair in found]
+    ranks = range(len(found), 0, -1) if doubts[0] > BEARABLE else doubts
+    reduction, solution = min(zip(ranks, found), key=lambda one: (not one[1][1].solved, one[0]))[1]
+    return Solved(reduction, replace(solution, seconds=dict(seconds)))
+
+
+def _doubt(reduction: Reduction, solution: Solution) -> float:
+    """The largest imbalance of a body and misfit of a pair."""
+    limits = validity(reduction, solution)[0]
+    parts = (limits["bodies"], "imbalance"), (limits["pairs"], "misfit")
+    return max((own[key] for table, key in parts for own in table.values()), default=0.0)
+
+
+def _on_ground(
+    held: Reduction, start: Solution | None, answer: Callable[[InterfaceProblem, Solution | None], Solution]
+) -> tuple[Reduction, Solution]:
+    """The answer for thin bodies, which a ground holds until it bears nothing or no longer gets less to bear."""
+    begin, before = time.perf_counter(), np.inf
+    solution = answer(held.problem, start)
+    for _ in range(ROUNDS):
+        left = _doubt(held, solution)
+        if left <= BALANCED or left > SLOW * before or not solution.solved:
+            break
+        held, before = held.pulled(solution), left
+        solution = answer(held.problem, solution)
+    return held, replace(solution, seconds={"solve": time.perf_counter() - begin})
