@@ -18,13 +18,13 @@ import contactopt
 from contactopt import scenes
 from contactopt.bodies.body import build_body
 from contactopt.bodies.solvers import SOLVERS, choose, make_solver, multigrid, solver_type
+from contactopt.bodies.solvers import sparse_products as products
 from contactopt.bodies.solvers.constants import FACTORS_UP_TO, PARDISO_FROM, RTOL
 from contactopt.bodies.solvers.multigrid import conjugate_gradients, near_neighbours, rigid_motions
 from contactopt.bodies.solvers.ordering import elimination_order, minimum_degree, nested_dissection
 from contactopt.bodies.solvers.sparse_products import SparseProduct
 from contactopt.bodies.solvers.system import Block, System
 from contactopt.errors import BackendError, InputError
-from contactopt.linear import sparse_products as products
 from contactopt.linear.concurrency import Crew
 
 

@@ -180,7 +180,12 @@ def test_too_little_memory_is_one_sentence(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr("contactopt.solving.solve_scene.reduce_bodies", full)
     assert main(["run", "punch-2d", "--elements", "4", "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
-    assert said.strip().splitlines()[-1].startswith("contactopt: this needs more memory") and "Traceback" not in said
+    assert (
+        said.strip()
+        .splitlines()[-1]
+        .startswith("contactopt: scene 'punch-2d' of 2 bodies with elements = 4 needs more memory than there is")
+        and "Traceback" not in said
+    )
     assert not (tmp_path / "out").exists()
 
 

@@ -97,11 +97,10 @@ class ElasticBody:
 
     @cached_property
     def equilibrium(self) -> Equilibrium | None:
-        iteration, kept = self.solver.iteration, self.kept
-        if iteration is None:
+        if not self.solver.iterative:
             return None
-        everywhere = sp.identity(len(self.body.load), format="csr")
-        return Equilibrium(*iteration, self.body.A.diagonal()[kept], kept, self._low_rank(everywhere))
+        kept, everywhere = self.kept, sp.identity(len(self.body.load), format="csr")
+        return Equilibrium(*self.solver.iteration, self.body.A.diagonal()[kept], kept, self._low_rank(everywhere))
 
     @property
     def interface_compliance(self) -> np.ndarray:
@@ -246,7 +245,7 @@ class ElasticBody:
         return _at_rest(self, reload_body(self.body, scene, part))
 
     def grounded(self, modulus: float) -> ElasticBody:
-        if self.ground is not None or self.solver.iteration is not None:
+        if self.ground is not None or self.solver.iterative:
             return self
         if not is_thin(self.body, self.relieved):
             return self

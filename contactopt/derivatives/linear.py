@@ -189,7 +189,9 @@ class Dense:
 
     def solve(self, right: np.ndarray, transposed: bool) -> np.ndarray:
         if self.singular is not None:
-            return _consistent(self.singular.T if transposed else self.singular, right)
+            if not transposed:
+                raise InputError(UNIQUE)  # forces have no derivative, whatever one that an adjoint asks for may have
+            return _consistent(self.singular.T, right)
         return np.asarray(la.lu_solve(self.factors, right, trans=int(not transposed), check_finite=False))
 
 

@@ -82,7 +82,17 @@ class Quantity:
     nodal: bool = False
 
     def read(self, reduction: Reduction, solution: Solution) -> Reading:
-        """Read it from a solution of a reduced scene; InputError where the scene does not have it."""
+        """Read it from a solution of a reduced scene; InputError where the scene does not have it.
+
+        Parameters
+        ----------
+        reduction : a reduced scene
+        solution : of its problem
+
+        Returns
+        -------
+        The value with its uncertainty, in the unit of the quantity.
+        """
         if self.reader is not None:
             return self.reader(reduction, solution)
         return Reading(self.slopes(Step(reduction, reduction.problem, solution)).value)

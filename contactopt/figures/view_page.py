@@ -82,9 +82,9 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
 
     meshes = {path.stem: meshio.read(path) for path in sorted(folder.glob("*.vtu"))}
     bodies = {name: mesh for name, mesh in meshes.items() if "von_mises" in mesh.point_data}
-    interface = dict(np.load(folder / "interface.npz"))
-    path = dict(np.load(folder / "path.npz")) if (folder / "path.npz").exists() else None
-    moving = dict(np.load(folder / STATES)) if path is not None and (folder / STATES).exists() else None
+    interface = _arrays(folder / "interface.npz")
+    path = _arrays(folder / "path.npz") if (folder / "path.npz").exists() else None
+    moving = _arrays(folder / STATES) if path is not None and (folder / STATES).exists() else None
     pairs = {name: meshes[f"contact-{name}"] for name in summary["pairs"]}
     axes = {"axisymmetric": ["r", "z"], "plane-strain": ["x", "y"]}.get(summary["kind"], ["x", "y", "z"])
     mirrors = [[axes.index(plane["axis"]), plane["place"]] for plane in summary["mirrors"]]
@@ -120,6 +120,12 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         "moving": moving is not None,
         "history": None if path is None else _history(folder / "history.csv"),
     }
+
+
+def _arrays(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of a file by name. NumPy leaves a damaged file open that it was given by its path."""
+    with path.open("rb") as file:
+        return dict(np.load(file))
 
 
 def _box(places: list[np.ndarray]) -> np.ndarray:

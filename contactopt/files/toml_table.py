@@ -57,7 +57,16 @@ class Table:
 
     @contextmanager
     def about(self, *below: str | int) -> Iterator[None]:
-        """Errors raised in this block are about this table, or about an entry of it."""
+        """Errors raised in this block are about this table, or about an entry of it.
+
+        Parameters
+        ----------
+        below : keys and numbers that lead from this table to the entry
+
+        Yields
+        ------
+        Nothing; the block runs in between.
+        """
         try:
             yield
         except InputError as error:
@@ -66,6 +75,16 @@ class Table:
             raise self.fail(str(error), *below) from error
 
     def has(self, key: str) -> bool:
+        """Say whether an entry is there.
+
+        Parameters
+        ----------
+        key : name of the entry
+
+        Returns
+        -------
+        True if it is.
+        """
         self.known.append(key)
         return key in self.data
 
@@ -136,7 +155,18 @@ class Table:
         return value
 
     def numbers(self, key: str, count: int | None, what: str) -> list[float]:
-        """An array of `count` finite numbers, which must be there."""
+        """An array of `count` finite numbers, which must be there.
+
+        Parameters
+        ----------
+        key : name of the entry
+        count : how many numbers, or None for any
+        what : how a message names them
+
+        Returns
+        -------
+        The numbers.
+        """
         values = self.take(key, list, what, needed=True)
         if count is not None and len(values) != count:
             raise self.fail(f"{key!r} must be {what}; got {len(values)} values.", key)
@@ -162,7 +192,16 @@ class Table:
         return None if data is None else Table(self.file, self.lines, data, (*self.place, key))
 
     def tables(self, key: str) -> list[Table]:
-        """The tables of an array, none if it is not there."""
+        """The tables of an array, none if it is not there.
+
+        Parameters
+        ----------
+        key : name of the entry
+
+        Returns
+        -------
+        The tables, each of which knows where it stands.
+        """
         found = self.take(key, list, "an array of tables, [{ name = value, ... }, ...]", [])
         for i, data in enumerate(found):
             if not isinstance(data, dict):

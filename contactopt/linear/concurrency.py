@@ -57,7 +57,12 @@ class Crew:
         self._process = os.getpid()
 
     def each(self, acts: Sequence[Callable[[], None]]) -> None:
-        """Do all of them, in any order. Whoever is free takes the next one, so that a busy machine costs no waiting."""
+        """Do all of them, in any order. Whoever is free takes the next one, so that a busy machine costs no waiting.
+
+        Parameters
+        ----------
+        acts : functions without arguments
+        """
         waiting = deque(acts)
 
         def work() -> None:

@@ -68,7 +68,17 @@ def straight(mesh: skfem.Mesh) -> skfem.Mesh:
 
 
 def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
-    """The mesh with the places (dim, n) of all nodes of a quadratic displacement, the vertices first; boundaries keep their names."""
+    """The mesh with the places (dim, n) of all nodes of a quadratic displacement, the vertices first; boundaries keep their names.
+
+    Parameters
+    ----------
+    mesh : a scikit-fem mesh
+    places : (dim, n) positions of all nodes, vertices first [length]
+
+    Returns
+    -------
+    The mesh of second order.
+    """
     if is_curved(mesh):
         return mesh
     made = CURVED[mesh.refdom.__name__](places, mesh.t)

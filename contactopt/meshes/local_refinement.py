@@ -168,7 +168,17 @@ def _refined(mesh: Any, how: Any, curves: Curves, places: np.ndarray | None = No
 
 
 def facets_of(mesh: Any, name: str) -> np.ndarray:
-    """The numbers of the facets of a boundary; the name '' stands for what has no name."""
+    """The numbers of the facets of a boundary; the name '' stands for what has no name.
+
+    Parameters
+    ----------
+    mesh : a scikit-fem mesh
+    name : of a boundary
+
+    Returns
+    -------
+    (f,) numbers of facets.
+    """
     if name:
         return np.asarray(mesh.boundaries[name])
     return np.setdiff1d(mesh.boundary_facets(), np.concatenate([[0][:0], *(mesh.boundaries or {}).values()]))

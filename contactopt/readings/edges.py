@@ -72,7 +72,18 @@ def contact_area(scene: Scene, half_width: float) -> float:
 
 
 def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
-    """Read the half-width of the contact zone [length], as contact_zone() does."""
+    """Read the half-width of the contact zone [length], as contact_zone() does.
+
+    Parameters
+    ----------
+    scene : says what the pair of surfaces is
+    problem : its interface problem
+    reactions : (k, dim) contact forces, normal first [force]
+
+    Returns
+    -------
+    The half-width [length].
+    """
     return contact_zone(scene, problem, reactions)[0]
 
 
@@ -185,7 +196,7 @@ def _half_width(
     area = float(problem.areas[inside].sum())
     counted = equivalent_half_width(scene, area)
     nodes = inside.sum() * 2.0 ** sum(problem.chart.mirrored)
-    share = 1 / nodes if problem.dim == 2 else (np.pi / nodes) ** 0.5 if nodes else 0.0  # of the nodes at the edge
+    share = (1 / nodes if problem.dim == 2 else (np.pi / nodes) ** 0.5) if nodes else 0.0  # of the nodes at the edge
     coarse = counted, float(counted * min(1.0, share)) if nodes else 0.0
     if inside.all() or not inside.any():
         return coarse

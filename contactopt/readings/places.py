@@ -23,7 +23,6 @@ from scipy.spatial import cKDTree
 from contactopt.bodies.protocol import Region
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
-from contactopt.meshes.cells import straight
 from contactopt.problem import Solution
 from contactopt.readings.constants import MOST_PEAKS
 from contactopt.readings.quantities import Peak, Reading
@@ -137,6 +136,8 @@ def _check_there(part: Part, region: Region, scene: Scene) -> None:
             f"body '{part.name}' has no boundary {region.boundary!r}; it has {', '.join(sorted(known)) or 'none'}."
         )
     if region.point:
+        from contactopt.meshes.cells import straight
+
         corners = straight(mesh).p
         low, high = corners.min(axis=1), corners.max(axis=1)
         slack = OUTSIDE * (high - low).max() + (region.radius or 0.0)

@@ -155,7 +155,17 @@ def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
 
 
 def nodal_pressure(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
-    """Divide the normal forces by the nodal areas, (k,) [stress]; 0 at contacts without an area."""
+    """Divide the normal forces by the nodal areas, (k,) [stress]; 0 at contacts without an area.
+
+    Parameters
+    ----------
+    problem : an interface problem
+    solution : of the problem
+
+    Returns
+    -------
+    (k,) pressures [stress].
+    """
     forces = solution.reactions[:, 0]
     return np.divide(forces, problem.areas, out=np.zeros(len(forces)), where=problem.areas > 0)
 
@@ -252,7 +262,17 @@ def _outermost(offsets: np.ndarray) -> bool:
 
 
 def width(reduction: Reduction, solution: Solution) -> float:
-    """Half-width of the contact zone of a scene with one pair of surfaces, as contact_zone() reads it [length]."""
+    """Half-width of the contact zone of a scene with one pair of surfaces, as contact_zone() reads it [length].
+
+    Parameters
+    ----------
+    reduction : a reduced scene with one pair of surfaces
+    solution : of its problem
+
+    Returns
+    -------
+    The half-width [length].
+    """
     return width_reading(reduction, solution).value
 
 
@@ -295,7 +315,17 @@ def _edges_of(problem: InterfaceProblem, inside: np.ndarray) -> tuple[Peak, ...]
 
 
 def stick_width(reduction: Reduction, solution: Solution) -> tuple[float, float]:
-    """Half-width of the stick zone of a scene with one pair of surfaces, and its uncertainty, as stick_edge() reads them [length]."""
+    """Half-width of the stick zone of a scene with one pair of surfaces, and its uncertainty, as stick_edge() reads them [length].
+
+    Parameters
+    ----------
+    reduction : a reduced scene with one pair of surfaces
+    solution : of its problem
+
+    Returns
+    -------
+    The half-width and its uncertainty [length].
+    """
     _one_pair(reduction)
     problem = reduction.problem
     slip = problem.displacements(solution.reactions, solution.multipliers)[:, 1:]
@@ -363,5 +393,16 @@ OF_ONE_PAIR = ("pressure", "width", "stick")  # these belong to a surface, not t
 
 
 def value_of(name: str, reduction: Reduction, solution: Solution) -> float:
-    """The value of one of READINGS, in its unit."""
+    """The value of one of READINGS, in its unit.
+
+    Parameters
+    ----------
+    name : one of READINGS
+    reduction : a reduced scene with one pair of surfaces
+    solution : of its problem
+
+    Returns
+    -------
+    The value.
+    """
     return READINGS[name](reduction, solution).value

@@ -13,11 +13,11 @@ import numpy as np
 from contactopt import Scene, scenes
 from contactopt.bodies.body import build_body
 from contactopt.bodies.solvers import multigrid
+from contactopt.bodies.solvers import sparse_products as products
 from contactopt.bodies.solvers.ordering import elimination_order
 from contactopt.bodies.solvers.sparse_products import SparseProduct
 from contactopt.bodies.solvers.superlu import factorise
 from contactopt.bodies.solvers.system import System
-from contactopt.linear import sparse_products as products
 from experiments.report import write
 
 REPEATS = 5
