@@ -97,10 +97,11 @@ class ElasticBody:
 
     @cached_property
     def equilibrium(self) -> Equilibrium | None:
-        if not self.solver.iterative:
+        iteration = self.solver.iteration if self.solver.iterative else None
+        if iteration is None:
             return None
         kept, everywhere = self.kept, sp.identity(len(self.body.load), format="csr")
-        return Equilibrium(*self.solver.iteration, self.body.A.diagonal()[kept], kept, self._low_rank(everywhere))
+        return Equilibrium(*iteration, self.body.A.diagonal()[kept], kept, self._low_rank(everywhere))
 
     @property
     def interface_compliance(self) -> np.ndarray:
