@@ -27,7 +27,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.body import Assembly, build_body, guides_of, reload_body
 from contactopt.bodies.elements import face_nodes
-from contactopt.bodies.fields import Fields, Limits, fields_of, limits_of, recovery_errors
+from contactopt.bodies.fields import Fields, Validity, fields_of, limits_of, recovery_errors
 from contactopt.bodies.protocol import Equilibrium, Guides, Mesh, Region, Surface
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
@@ -229,7 +229,7 @@ class ElasticBody:
     def seen(self, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
         return np.asarray(T @ U)
 
-    def limits(self, U: np.ndarray, force: np.ndarray) -> Limits:
+    def limits(self, U: np.ndarray, force: np.ndarray) -> Validity:
         return limits_of(self.body, U, force)
 
     def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:

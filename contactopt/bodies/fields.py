@@ -62,7 +62,7 @@ class Fields:
         meshio.Mesh(points, [elements_of(self.mesh)], data).write(path, file_format="vtu")
 
 
-class Limits(NamedTuple):
+class Validity(NamedTuple):
     """What small displacements and the equations of a body are worth at a displacement.
 
     imbalance  sum of the nodal forces that nothing balances, relative to that of all forces on the body
@@ -76,7 +76,7 @@ class Limits(NamedTuple):
     moved: float = 0.0
 
 
-def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Limits:
+def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
     """Compute how far a body is from equilibrium, strained and turned, from its stiffness and its elements alone.
 
     Parameters
@@ -90,7 +90,7 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Limits:
 
     Returns
     -------
-    Limits
+    Validity
         The imbalance counts the free unknowns and, for each plate that moves, the sum over its unknowns.
     """
     internal = body.A @ U
@@ -105,7 +105,7 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Limits:
     strain = np.abs(np.linalg.eigvalsh((mean + turned) / 2)).max(initial=0.0)
     rotation = np.linalg.norm(mean - turned, axis=(1, 2)).max(initial=0.0) / np.sqrt(8)
     moved = float(np.abs(U).max(initial=0.0))
-    return Limits(unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation), moved)
+    return Validity(unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation), moved)
 
 
 def fields_of(body: Assembly, U: np.ndarray) -> Fields:

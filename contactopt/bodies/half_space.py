@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.fields import Limits
+from contactopt.bodies.fields import Validity
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
 from contactopt.bodies.protocol import Guides, Surface
 from contactopt.errors import InputError
@@ -256,8 +256,8 @@ class HalfSpaceBody:
     def seen(self, T: sp.csr_matrix, U: np.ndarray) -> np.ndarray:
         return np.asarray(T @ U)
 
-    def limits(self, U: np.ndarray, force: np.ndarray) -> Limits:
-        return Limits()
+    def limits(self, U: np.ndarray, force: np.ndarray) -> Validity:
+        return Validity()
 
     def grounded(self, modulus: float) -> HalfSpaceBody:
         return self

@@ -25,7 +25,7 @@ import scipy.sparse as sp
 from contactopt.linear.saddle_point import BodyTerm, LocalTerm
 
 if TYPE_CHECKING:
-    from contactopt.bodies.fields import Fields, Limits
+    from contactopt.bodies.fields import Fields, Validity
     from contactopt.bodies.stress_recovery import StressMap
     from contactopt.linear.convolution import Kernel
     from contactopt.linear.operators import Product
@@ -579,7 +579,7 @@ class Body(Protocol):
             (rows,) [length].
         """
 
-    def limits(self, U: np.ndarray, force: np.ndarray) -> Limits:
+    def limits(self, U: np.ndarray, force: np.ndarray) -> Validity:
         """Tell how far the body is from equilibrium, strained and turned (contactopt.bodies.fields).
 
         Parameters
@@ -591,7 +591,7 @@ class Body(Protocol):
 
         Returns
         -------
-        Limits
+        Validity
             Zeros for a body that has no equations of its own.
         """
 

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies import resident
 from contactopt.bodies.elastic import AssembledElastic
-from contactopt.bodies.fields import Fields, Limits
+from contactopt.bodies.fields import Fields, Validity
 from contactopt.bodies.protocol import Guides, Region, Surface
 from contactopt.bodies.ranks import Kept, RemotePart, Team, shipped, values_of
 from contactopt.bodies.stress_recovery import StressMap
@@ -290,8 +290,8 @@ class RemoteBody:
     def seen(self, T: sp.csr_matrix, U: Any) -> np.ndarray:
         return np.asarray(self._ask(resident.seen, T, U.kept))
 
-    def limits(self, U: Any, force: np.ndarray) -> Limits:
-        return Limits(*self._act("limits", U, force))
+    def limits(self, U: Any, force: np.ndarray) -> Validity:
+        return Validity(*self._act("limits", U, force))
 
     def grounded(self, modulus: float) -> RemoteBody:
         return self
