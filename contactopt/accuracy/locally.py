@@ -68,11 +68,13 @@ class Locally:
             mesh, order = mesh_error(self.values, self.best)
             return Judged(abs(mesh), mesh, order=order)
         self.errors = element_errors(solved, self.quantity, reading.value)
-        change = float(np.max(np.abs(np.diff(self.values[-3:])), initial=0.0))  # one alone may be small by chance
+        # of two refinements, since what one changes may be small by chance
+        change = float(np.max(np.abs(np.diff(self.values[-3:])), initial=0.0))
         size = self.errors.size
         if self.errors.unsigned:  # no adjoint: what the last refinement changed, twice
             size = 2 * change if len(self.values) > 1 else np.inf
-        return Judged(max(size, change) + reading.uncertainty, -self.errors.total, energy=self.errors.energy)
+        size = max(size, change) + reading.uncertainty
+        return Judged(size, -self.errors.total, energy=self.errors.energy)
 
     def vain(self) -> str:
         """One sentence that says why further refinement would be in vain, or an empty text."""

@@ -191,8 +191,8 @@ class _Loop:
     def _rivals(self) -> tuple[list[Peak], float]:
         """The local maxima that may be the largest, and by how much they may exceed the value.
 
-        The largest is among them until smaller elements around it have changed it little; where all elements are divided,
-        the differences of nested solutions tell more.
+        The largest is among them until smaller elements around it have changed it little; where
+        all elements are divided, the differences of nested solutions tell more.
         """
         last = self.peaks[-1]
         found, excess = [], 0.0
@@ -207,7 +207,7 @@ class _Loop:
         return found, excess
 
     def _change(self, peak: Peak) -> float:
-        """By how much the same peak differed on the last mesh whose elements were larger there, or half the value.
+        """By how much a peak differed on the last mesh of larger elements there, or half the value.
 
         What nodes scatter about a fit is no measure here: where facets change their length, it is large on every mesh.
         """
