@@ -9,11 +9,13 @@ from conftest import MATERIAL
 
 from contactopt import InputError, Part, Plate, Rigid, Scene, Support, scenes
 from contactopt.accuracy import loop, refine
+from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import balanced, divisible, overlooked
 from contactopt.accuracy.polygon import chords_of, flatter
-from contactopt.readings.quantities import pressure_reading, width_reading
+from contactopt.derivatives.outputs import find_quantity
+from contactopt.readings.quantities import Peak, Reading, pressure_reading, width_reading
 from contactopt.scenes import make_scene
-from contactopt.solving.solve_scene import solve_scene
+from contactopt.solving.solve_scene import Options, solve_scene
 
 
 def block(cells=8, wide=4.0, high=2.0, **changes):
@@ -170,3 +172,25 @@ def test_one_rank_is_asked_for():
 
     with pytest.raises(InputError, match="'far' lives on another rank"):
         _check_here(replace(solve_scene(scenes.flat_punch(2, elements=4)).reduction, bodies=(Far(),)))
+
+
+def test_a_peak_is_compared_with_itself_on_larger_elements():
+    """A peak elsewhere, and one on elements of the same size, tell nothing of it."""
+
+    def peak(value, x, size):
+        return Peak(value, 0.0, np.array([x, 0.0]), size)
+
+    earlier = (peak(9.0, 0.1, 0.1), peak(1.0, 5.0, 0.1), peak(9.9, 0.0, 0.05))
+    found = object.__new__(loop._Loop)
+    found.peaks = [earlier, ()]
+    assert found._change(peak(10.0, 0.0, 0.05)) == pytest.approx(1.0)
+    assert found._change(peak(10.0, 2.0, 0.05)) == pytest.approx(loop.UNWATCHED * 10)
+    assert found._change(peak(10.0, 0.0, 0.1)) == pytest.approx(loop.UNWATCHED * 10)
+
+
+def test_the_scatter_of_a_reading_is_added_to_the_error_of_the_mesh():
+    search = Locally((pressed(parabola),), find_quantity("pressure", pressed(parabola)), Options(), False)
+    solved = search.solve()
+    reading = search.quantity.read(solved.reduction, solved.solution)
+    sizes = [search.judge(solved, Reading(reading.value, more), ()).size for more in (0.0, 0.25)]
+    assert sizes[1] - sizes[0] == pytest.approx(0.25)

@@ -68,11 +68,13 @@ class Locally:
             mesh, order = mesh_error(self.values, self.best)
             return Judged(abs(mesh), mesh, order=order)
         self.errors = element_errors(solved, self.quantity, reading.value)
-        change = abs(reading.value - self.values[-2]) if len(self.values) > 1 else 0.0
+        # of two refinements, since what one changes may be small by chance
+        change = float(np.max(np.abs(np.diff(self.values[-3:])), initial=0.0))
         size = self.errors.size
         if self.errors.unsigned:  # no adjoint: what the last refinement changed, twice
             size = 2 * change if len(self.values) > 1 else np.inf
-        return Judged(max(size, change), -self.errors.total, energy=self.errors.energy)
+        size = max(size, change) + reading.uncertainty
+        return Judged(size, -self.errors.total, energy=self.errors.energy)
 
     def vain(self) -> str:
         """One sentence that says why further refinement would be in vain, or an empty text."""
@@ -108,7 +110,7 @@ class Locally:
             assert self.last is not None and self.errors is not None
             reduction = self.last.reduction
             chosen = list(rivals)
-            if reading.uncertainty > 0.5 * judged.size:
+            if reading.uncertainty > judged.size / 3:  # of which it is a part
                 chosen += reading.peaks[:1]
             near = [contacts, *(peak.contacts for peak in chosen)]
             if rivals:

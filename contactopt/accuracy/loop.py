@@ -27,6 +27,7 @@ from contactopt.solving.solve_scene import Options, Solved
 log = logging.getLogger(__name__)
 MOST_LEVELS = 60
 WATCHED = 1.5  # by how much larger the elements at a peak must have been for its change to tell its error
+SAME_PEAK = 8.0  # elements by which a peak moves at most from one mesh to the next
 UNWATCHED = 0.5  # of its value that a peak may be larger where no smaller elements have shown it
 ROUNDING = 1e-15  # least relative error: no reading is exact
 
@@ -188,11 +189,16 @@ class _Loop:
         return ""
 
     def _rivals(self) -> tuple[list[Peak], float]:
-        """The local maxima that may be the largest, and by how much they may exceed the value."""
+        """The local maxima that may be the largest, and by how much they may exceed the value.
+
+        The largest is among them until smaller elements around it have changed it little; where
+        all elements are divided, the differences of nested solutions tell more.
+        """
         last = self.peaks[-1]
-        if len(last) < 2:
-            return [], 0.0
         found, excess = [], 0.0
+        if isinstance(self.search, Locally) and not self.search.whole and last and last[0].size:
+            excess = self._change(last[0])
+            found = [last[0]] if excess > self.judged.size / 2 else []
         for peak in last[1:]:
             doubt = self._change(peak)
             if peak.value + doubt >= last[0].value - last[0].uncertainty:
@@ -201,15 +207,19 @@ class _Loop:
         return found, excess
 
     def _change(self, peak: Peak) -> float:
-        """By how much the nearest peak on the last mesh whose elements were larger there differed, or half the value.
+        """By how much a peak differed on the last mesh of larger elements there, or half the value.
 
         What nodes scatter about a fit is no measure here: where facets change their length, it is large on every mesh.
         """
         for earlier in reversed(self.peaks[:-1]):
-            larger = [one for one in earlier if one.size >= WATCHED * peak.size]
+            away = [float(np.linalg.norm(one.place - peak.place)) for one in earlier]
+            larger = [
+                (distance, abs(one.value - peak.value))
+                for one, distance in zip(earlier, away)
+                if one.size >= WATCHED * peak.size and distance <= SAME_PEAK * one.size
+            ]
             if larger:
-                nearest = min(larger, key=lambda one: float(np.linalg.norm(one.place - peak.place)))
-                return abs(nearest.value - peak.value)
+                return min(larger)[1]
         return UNWATCHED * peak.value
 
     def _unresolved(self) -> np.ndarray:

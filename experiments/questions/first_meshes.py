@@ -27,8 +27,8 @@ from experiments.questions.adaptivity.parts import rounded, save
 from experiments.report import write
 
 STEEL = Material(210e3, 0.3)
-TARGET, SECONDS = 0.02, 40.0  # accuracy asked for, and time for one search
-SURE = 0.01  # relative error of the references that are meshes
+TARGET, SECONDS = 0.02, 30.0  # accuracy asked for, and time for one search
+SURE = 1e-3  # least relative error of a reference
 EFFECTIVE = 0.5, 3.0
 
 
@@ -222,15 +222,16 @@ class Case:
     small: float
     exact: Callable[[], dict[str, float]] | None = None
 
-    def reference(self) -> tuple[dict[str, float], float]:
-        """The references, and their relative error."""
+    def reference(self) -> tuple[dict[str, float], dict[str, float]]:
+        """The references, and their relative errors: that of a mesh is by how much one twice as coarse differs."""
         if self.exact is not None:
-            return self.exact(), 1e-3
-        return values(self.make(FINE, self.small), self.quantities), SURE
+            return self.exact(), dict.fromkeys(self.quantities, SURE)
+        coarse, fine = (values(self.make(FINE, factor * self.small), self.quantities) for factor in (2, 1))
+        return fine, {name: max(abs(coarse[name] / fine[name] - 1), SURE) for name in self.quantities}
 
 
 CASES = {
-    "dovetail": Case(dovetail, ("pressure", "energy"), 0.002),
+    "dovetail": Case(dovetail, ("pressure", "energy"), 0.0005),
     "lug": Case(lug, ("pressure", "energy", "von_mises:lug:contact"), 0.24),
     "press fit": Case(press_fit, ("pressure", "von_mises:shaft:bore"), 0.5, lame),
     "flat-and-rounded": Case(punch, ("pressure",), 0.01, half_plane),
@@ -241,9 +242,10 @@ CASES = {
 def rows_of(name: str, meshes: list[First], modes: tuple[bool, ...]) -> list[dict[str, Any]]:
     """All searches of one part."""
     case, rows = CASES[name], []
-    truth, slack = case.reference()
+    truth, slacks = case.reference()
     for first in meshes:
         for quantity in case.quantities:
+            slack = slacks[quantity]
             for adaptive in modes:
                 begin = time.process_time()
                 row = {"part": name, "quantity": quantity, "first mesh": first.name,
@@ -259,7 +261,8 @@ def rows_of(name: str, meshes: list[First], modes: tuple[bool, ...]) -> list[dic
                 claim = np.inf if found.error is None else found.error
                 rows.append(
                     row | {
-                        "value": found.value, "reference": truth[quantity], "true error": true, "claimed": claim,
+                        "value": found.value, "reference": truth[quantity], "true error": true, "of the reference": slack,
+                        "claimed": claim,
                         "geometry": found.geometry_error, "reached": found.reached,
                         "within": bool(true <= claim + slack),
                         "effectivity": claim / max(true, slack),
@@ -279,12 +282,24 @@ def main(arguments: list[str]) -> None:
     reached = [row for row in done if row["reached"]]
     sized = [row for row in reached if row["true error"] > TARGET / 20]  # smaller errors are luck, or the reference's
     good = sum(EFFECTIVE[0] <= row["effectivity"] <= EFFECTIVE[1] for row in sized)
-    text = f"""{__doc__.split(chr(10))[0]}
+    missed = [f"{row['part']}, {row['quantity']}, {row['first mesh']}" for row in done if not row["within"]]
+    refused = [f"{row['part']}, {row['quantity']}, {row['first mesh']}: {row['said']}" for row in rows if row["said"]]
+    text = f"""{sum(row["within"] for row in done)} of {len(rows)} searches give an answer that agrees with the reference within their
+claimed error. {len(reached)} of them reached the target, {sum(row["within"] for row in reached)} of these agree. The effectivity, the claimed
+error over the true one, lies between {EFFECTIVE[0]} and {EFFECTIVE[1]} for {good} of {len(sized)} searches that reached the target
+with a true error above {TARGET / 20:g}. Smaller true errors are luck, or those of the reference.
 
-Asked for {TARGET:g} within {SECONDS:g} s. {len(rows)} searches, {len(reached)} of which reached the target; of all,
-{sum(row["within"] for row in done)} answers agree with the reference within the claimed error, of those that reached the
-target {sum(row["within"] for row in reached)}. The effectivity lies between {EFFECTIVE[0]} and {EFFECTIVE[1]} for {good} of {len(sized)}
-searches that reached the target with a true error above {TARGET / 20:g}.
+Outside their claims are: {"; ".join(missed) or "none"}. No answer came from: {"; ".join(refused) or "none"}.
+
+The pressure of the dovetail has no limit in the linearised model. Where the flank meets the rounding, the curvature of the
+surface jumps. The normals there turn, and a blade that slides by u closes the gap by u times their angle. So the gap
+has a kink. For a jump k of the curvature the pressure there grows by E* k u ln 2 / (2 pi) with every halving of the elements
+once they are smaller than about u. Searches that go so far say that no mesh bounds it. Their claim is then infinite, and counts as agreeing.
+The reference of the dovetail, whose elements are about as large as u there, does not show this.
+
+Each search asked for {TARGET:g} within {SECONDS:g} s{", of two first meshes (`quick`)" if quick else ""}. The meshes know neither where the parts touch nor their shape. A reference
+is Lame's formula, a half-plane of 8,192 points, or a mesh that Gmsh makes fine; its error is then its difference
+from one that is twice as coarse.
 
 {{searches}}
 """
