@@ -193,17 +193,40 @@ def _surroundings(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
 def _fitted_top(
     problem: InterfaceProblem, pressure: np.ndarray, usable: np.ndarray, top: int
 ) -> tuple[float, float, np.ndarray, float]:
-    """Value and uncertainty of the pressure near a node from a fit to its square, the contacts used, and their distance."""
+    """Value and uncertainty of the pressure near a node, the contacts next to it, and their distance.
+
+    The value is that of the widest fit that agrees with all narrower ones within their uncertainties: a smooth
+    pressure is read from many contacts, a narrow peak from the few that it has (after Lepski).
+    """
+    count, places = FITTED[problem.dim], len(_surroundings(problem)[1])
+    narrowest = _fit_to(count, problem, pressure, usable, top)
+    found, (value, doubt) = [], narrowest[:2]
+    while np.isfinite(doubt) and all(abs(value - other) <= around for other, around in found):
+        found.append((value, doubt))
+        count *= 2
+        if count > places:
+            break
+        value, doubt = _fit_to(count, problem, pressure, usable, top)[:2]
+    return *(found[-1] if found else (narrowest[0], narrowest[0])), *narrowest[2:]
+
+
+def _fit_to(
+    count: int, problem: InterfaceProblem, pressure: np.ndarray, usable: np.ndarray, top: int
+) -> tuple[float, float, np.ndarray, float]:
+    """As _fitted_top, from a quadratic fit to the square of the pressure at `count` contacts.
+
+    The uncertainty is infinite where these are too few, or not all pressed.
+    """
     places, node = _surroundings(problem)
     offset = places - problem.chart.places[:, [top]]
     distance = np.where(usable[node], np.linalg.norm(offset, axis=0), np.inf)
-    near = np.argsort(distance, kind="stable")[: min(FITTED[problem.dim], int(usable[node].sum()))]
+    near = np.argsort(distance, kind="stable")[: min(count, int(usable[node].sum()))]
     own, nodal = np.unique(node[near]), float(pressure[top])
     reach = float(distance[near].max(initial=0.0))
     size = reach / max(len(near) / 2, 1) ** (1 / len(places)) or float(problem.areas[top] ** (1 / len(places)))
     powers = list(combinations_with_replacement(range(len(places) + 1), 2))  # with a first coordinate of 1
     if len(near) <= len(powers) or not np.all(pressure[node[near]] > 0):
-        return nodal, nodal, own, size  # too few contacts to know
+        return nodal, np.inf, own, size  # too few contacts to know
     terms = np.concatenate([np.ones((1, len(near))), offset[:, near] / reach])
     terms = np.array([terms[i] * terms[j] for i, j in powers]).T
     square, root = pressure[node[near]] ** 2, np.sqrt(problem.areas[node[near]] / problem.areas[node[near]].mean())
