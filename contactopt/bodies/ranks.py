@@ -162,7 +162,9 @@ class Team:
     def _order(self, rank: int, order: Any, number: int | None = None) -> None:
         """Send without waiting; the bytes are kept until they have arrived. InputError once the ranks were dismissed."""
         if self._dismissed:
-            raise InputError("the ranks that hold the bodies of this result were dismissed; ask before, or run it again.")
+            raise InputError(
+                "the ranks that hold the bodies of this result were dismissed; ask before, or run it again."
+            )
         freed, waiting = [], self._freed[rank]
         while waiting:
             freed.append(waiting.popleft())
