@@ -202,7 +202,7 @@ def test_plugins_of_every_bad_kind_get_the_rows_that_they_deserve(tmp_path, monk
     text = """
         name = "bad"
         plugins = ["bad.py"]
-        time_limit = 1.5
+        time_limit = 5.0
         memory_limit = 1.0
         settings = ["mid"]
     """
