@@ -54,13 +54,13 @@ _HOMES = {
     "plugins": ("method", "problem"),
     "store": ("COLUMNS", "STATUSES", "load", "save"),
 }
-_MODULES = ("figures", "report", "tables")
+_MODULES = {"figures": "report_figures", "report": "reports", "tables": "tables"}  # public name -> file
 __all__ = sorted([*(name for names in _HOMES.values() for name in names), *_MODULES])
 
 
 def __getattr__(name: str) -> Any:
     if name in _MODULES:
-        return import_module(f"contactopt.benchmark.{name}")
+        return import_module(f"contactopt.benchmark.{_MODULES[name]}")
     for module, names in _HOMES.items():
         if name in names:
             return getattr(import_module(f"contactopt.benchmark.{module}"), name)
