@@ -230,8 +230,6 @@ def run(
     if simplest:
         states, known = _simplest(states, options)
         backends = chosen.backends(states[-1].dim)
-    if team is not None and team.size > 1 and aim is not None and (aim.adaptive or states[-1].given):
-        raise InputError("meshes on several ranks are not refined locally; run on one rank, or without an accuracy.")
     if team is not None:
         idle = team.size - sum(isinstance(part, Part) for part in states[-1].parts)
         if idle > 0:

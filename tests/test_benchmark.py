@@ -12,13 +12,15 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, benchmark, natural_map_residual, solve
-from contactopt.benchmark import problems, store
+from contactopt.benchmark import pool, problems, store
 from contactopt.benchmark.experiment import read_experiment
 from contactopt.benchmark.measure import Task, associated_residual
 from contactopt.benchmark.pool import Shares, Worker
 from contactopt.benchmark.runs import MethodSpec, Run
 from contactopt.benchmark.store import COLUMNS, STATUSES, Store, lines
 from contactopt.cli import main
+
+PATIENCE = 120  # seconds; a test that needs them hangs
 
 SMALL = """
 name = "small"
@@ -124,7 +126,7 @@ def test_fakes_become_honest_rows(tmp_path):
     text = f"""
         name = "fakes"
         plugins = ["fakes.py"]
-        time_limit = 1.0
+        time_limit = 4.0
         memory_limit = 2.0
         settings = ["mid"]
         [[problems]]
@@ -152,7 +154,7 @@ def test_fakes_become_honest_rows(tmp_path):
     assert "SIGABRT" in row["aborts"]["message"] and "last words" in row["aborts"]["message"]
     assert "KeyError" in row["raises"]["message"]
     assert row["lies"]["claimed"] and not row["lies"]["success"] and row["lies"]["residual"] > 1e-4
-    assert np.isinf(row["nan"]["residual"]) and 1.0 < row["hangs"]["call_seconds"] < 10
+    assert np.isinf(row["nan"]["residual"]) and 4.0 < row["hangs"]["call_seconds"] < PATIENCE
 
 
 def test_killed_campaigns_lose_and_repeat_nothing(tmp_path):
@@ -167,7 +169,7 @@ def test_killed_campaigns_lose_and_repeat_nothing(tmp_path):
             command, start_new_session=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
         )
         before = time.monotonic()
-        while process.poll() is None and time.monotonic() - before < 30:
+        while process.poll() is None and time.monotonic() - before < PATIENCE:
             time.sleep(0.02)
             if count(out) > (counts[-1] if counts else 0):  # it works: kill it soon
                 time.sleep(rng.uniform(0, 0.1))
@@ -192,7 +194,7 @@ def test_an_interrupted_campaign_keeps_its_rows(tmp_path):
     while process.poll() is None and count(out) < 5:
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
-    assert "--resume" in process.communicate(timeout=30)[1].splitlines()[-1] and process.returncode == 130
+    assert "--resume" in process.communicate(timeout=PATIENCE)[1].splitlines()[-1] and process.returncode == 130
     with Store(out, resume=True) as store:
         assert len(store.finished()) >= 5
 
@@ -212,7 +214,7 @@ def test_workers_die_with_their_campaign(tmp_path):
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     children = Path(f"/proc/{process.pid}/task")
     worker = None
-    for _ in range(200):
+    for _ in range(20 * PATIENCE):
         time.sleep(0.05)
         found = [w for task in children.iterdir() for w in (task / "children").read_text().split()]
         if found:
@@ -222,7 +224,7 @@ def test_workers_die_with_their_campaign(tmp_path):
     time.sleep(0.5)
     process.kill()
     process.wait()
-    for _ in range(100):
+    for _ in range(20 * PATIENCE):
         time.sleep(0.05)
         if not worker.exists() or (worker / "stat").read_text().split()[2] == "Z":
             return
@@ -468,7 +470,8 @@ def test_materials_of_scenes_by_name():
         problems.scene("punch-2d", lower_E=2.0, stiffness_ratio=10.0)
 
 
-def test_a_run_past_its_time_limit_is_no_success(tmp_path):
+def test_a_run_past_its_time_limit_is_no_success(tmp_path, monkeypatch):
+    monkeypatch.setattr(pool, "GRACE", float(PATIENCE))
     written(
         tmp_path,
         "import time\nfrom contactopt import solve\nfrom contactopt.benchmark import method\n@method\n"

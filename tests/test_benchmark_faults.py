@@ -202,7 +202,7 @@ def test_plugins_of_every_bad_kind_get_the_rows_that_they_deserve(tmp_path, monk
     text = """
         name = "bad"
         plugins = ["bad.py"]
-        time_limit = 1.5
+        time_limit = 5.0
         memory_limit = 1.0
         settings = ["mid"]
     """
@@ -239,7 +239,7 @@ def test_a_hanging_plugin_costs_about_its_time_limit(tmp_path):
         worker.solver.start()
         worker.solver.ask(100.0, "look", os.getpid)
         start = time.monotonic() - start
-    assert seconds[0] < pool.PLUGIN_WARM_UP + hard + 4 * start + 2.0 and max(seconds[1:]) < hard + 2 * start + 2.0
+    assert seconds[0] < pool.PLUGIN_WARM_UP + hard + 4 * start + 10.0 and max(seconds[1:]) < hard + 2 * start + 10.0
 
 
 def test_nothing_that_a_solver_started_outlives_the_campaign(tmp_path):
@@ -460,7 +460,7 @@ def test_killed_processes_cost_their_own_run_only(tmp_path):
     for rounds in range(3):
         process = subprocess.Popen(command, start_new_session=True, **quiet)
         before, begin = count(out), time.monotonic()
-        while process.poll() is None and count(out) == before and time.monotonic() - begin < 60:
+        while process.poll() is None and count(out) == before and time.monotonic() - begin < 120:
             time.sleep(0.02)
         for _ in range(2):
             time.sleep(rng.uniform(0, 0.1))

@@ -7,7 +7,7 @@ import pytest
 import skfem
 from conftest import MATERIAL
 
-from contactopt import InputError, Part, Plate, Rigid, Scene, Support, scenes
+from contactopt import InputError, Part, Plate, Rigid, Scene, Support
 from contactopt.accuracy import loop, refine
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import balanced, divisible, overlooked
@@ -162,16 +162,6 @@ def test_what_edges_leave_open_is_where_the_curvature_changes():
     changing = (np.abs(middle[0]) < 0.27) & (middle[0] > -0.2)
     assert np.all(doubt[changing] > 0) and np.all(doubt[middle[0] > 0.3] == 0)
     assert np.allclose(flatter(arc, (begin, end, doubt)), arc)
-
-
-def test_one_rank_is_asked_for():
-    from contactopt.derivatives.states import _check_here
-
-    class Far:
-        name = "far"
-
-    with pytest.raises(InputError, match="'far' lives on another rank"):
-        _check_here(replace(solve_scene(scenes.flat_punch(2, elements=4)).reduction, bodies=(Far(),)))
 
 
 def test_a_peak_is_compared_with_itself_on_larger_elements():

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.accuracy.estimate import Level
+from contactopt.bodies.protocol import Region
 from contactopt.meshes.cells import straight
 from contactopt.meshes.curves import CORNER
 from contactopt.meshes.local_refinement import simplices
@@ -52,14 +53,19 @@ def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
         what = "pressure"
     else:
         what = "stress"
-        body: Any = solved.reduction.bodies[peak.body]  # the stress was read from its elements
-        mesh = straight(body.body.basis.mesh)
-        vertex = int(np.argmin(np.linalg.norm(mesh.p - peak.place[:, None], axis=0)))
-        if len(levels) > TRIED and re_entrant(mesh, vertex) and _rises(levels):
+        if len(levels) > TRIED and _rises(levels) and _in_corner(solved, peak):
             return f"the largest stress is at the re-entrant corner near ({place}), where it is infinite; no mesh bounds it"
     if _grows(levels, GROWTHS):
         return f"the largest {what}, at ({place}), grows with every refinement like an infinite one; no mesh bounds it"
     return ""
+
+
+def _in_corner(solved: Solved, peak: Peak) -> bool:
+    """Whether a peak of the stress lies at a re-entrant corner of its body, wherever that body is."""
+    read = solved.reduction.bodies[peak.body].stress_map(Region())
+    assert read is not None  # the stress was read from its elements
+    mesh = straight(read.mesh)
+    return re_entrant(mesh, int(np.argmin(np.linalg.norm(mesh.p - peak.place[:, None], axis=0))))
 
 
 def _at_rim(solved: Solved, peak: Peak) -> bool:

@@ -289,15 +289,9 @@ def _lattice(dim: int) -> np.ndarray:
 
 
 def check_refinable(scene: Scene) -> None:
-    """InputError, before anything is solved, for a scene that has no mesh to refine, or one that lives on another rank."""
-    meshed = [part for part in scene.parts if isinstance(part, Part)]
-    if not meshed:
+    """InputError, before anything is solved, for a scene that has no mesh to refine."""
+    if not any(isinstance(part, Part) for part in scene.parts):
         raise InputError(
             f"scene '{scene.name}' has no mesh to refine: give the points of its half-spaces as a function "
             "(elements, zone) -> points."
-        )
-    away = [part.name for part in meshed if getattr(part, "team", None) is not None]
-    if away:
-        raise InputError(
-            f"the mesh of body '{away[0]}' lives on another rank, where it is not refined locally; run on one rank."
         )

@@ -78,6 +78,11 @@ class Team:
         self._number = 0
         self._sent: list[tuple[Any, bytes]] = []
         self._freed: list[deque[int]] = [deque() for _ in range(comm.size)]
+        self._dismissed = False
+
+    def __reduce__(self) -> tuple[type[None], tuple[()]]:
+        """Travel as None: functions that make meshes may hold parts of a team, which other ranks have no use for."""
+        return type(None), ()
 
     @property
     def size(self) -> int:
@@ -144,6 +149,7 @@ class Team:
         """End the loops of all other ranks."""
         for rank in range(1, self.size):
             self._order(rank, None)
+        self._dismissed = True
         while self._sent:
             self._forget_what_arrived()
             time.sleep(SHORTEST)
@@ -154,7 +160,11 @@ class Team:
             return self._number
 
     def _order(self, rank: int, order: Any, number: int | None = None) -> None:
-        """Send without waiting; the bytes are kept until they have arrived."""
+        """Send without waiting; the bytes are kept until they have arrived. InputError once the ranks were dismissed."""
+        if self._dismissed:
+            raise InputError(
+                "the ranks that hold the bodies of this result were dismissed; ask before, or run it again."
+            )
         freed, waiting = [], self._freed[rank]
         while waiting:
             freed.append(waiting.popleft())

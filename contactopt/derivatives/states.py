@@ -359,9 +359,7 @@ def chain_of(result: Any, distance: float | None = None) -> Chain:
                 "a derivative needs a solved scene: what contactopt.run or contactopt.follow returns; "
                 f"got {type(result).__name__}."
             )
-        _check_here(reduction)
         return Chain((Step(reduction, reduction.problem, solution, distance),))
-    _check_here(path.reduction)
     steps = []
     for number, state in enumerate(path.states):
         reduction = path.reduction.loaded(state.scene)
@@ -370,15 +368,6 @@ def chain_of(result: Any, distance: float | None = None) -> Chain:
         if not state.solution.solved:
             raise InputError(f"state {number} of the path is not certified; a derivative needs all states solved.")
     return Chain(tuple(steps))
-
-
-def _check_here(reduction: Reduction) -> None:
-    """InputError if a body lives on another rank, which cannot be asked for derivatives."""
-    for body in reduction.bodies:
-        if not hasattr(body, "material_work"):
-            raise InputError(
-                f"body '{body.name}' lives on another rank, where no derivatives are taken; run on one rank."
-            )
 
 
 def _one_per_contact(which: Parameter, amount: Any, contacts: int) -> np.ndarray:

@@ -182,7 +182,7 @@ def read_stress(place: Place, reduction: Reduction, displaced: tuple[np.ndarray,
     Raises
     ------
     InputError
-        For a boundary that the body does not have, a point outside the body, and a body on another rank.
+        For a boundary that the body does not have, and a point outside the body.
     """
     from contactopt.bodies.fields import STRESSES
     from contactopt.bodies.stress_recovery import von_mises, von_mises_slopes
@@ -248,7 +248,7 @@ def map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> Stre
     Raises
     ------
     InputError
-        Where the stress of the body cannot be read, as on another rank.
+        Where the stress of the body cannot be read.
     """
     number = [part.name for part in reduction.scene.parts].index(place.owner)
     recovered = reduction.bodies[number].stress_map(place.region, by_poisson)
