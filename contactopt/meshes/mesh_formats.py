@@ -156,7 +156,7 @@ def _read(path: Path) -> Any:
                 if name == "abaqus":
                     return read_inp(path)
                 if binary:
-                    return read_msh2(path) if stated.startswith("2") else read_msh4(path, stated != "4.0")
+                    return read_msh2(path) if str(stated)[0] == "2" else read_msh4(path, stated != "4.0")
                 return meshio.read(path, file_format=name) if name in SAFE else _read_apart(path, name, size)
         except (Exception, SystemExit) as error:
             text = printed.getvalue() if isinstance(error, SystemExit) else str(error)

@@ -67,7 +67,8 @@ def read_msh4(path: Path, newer: bool) -> Any:
     groups = _groups(sections.get("Entities"), names, newer)
     tags, points = _nodes(sections["Nodes"], newer)
     reader = sections["Elements"]
-    blocks, members = [], []
+    blocks: list[tuple[int, np.ndarray]] = []
+    members: list[list[str]] = []
     for _ in range(reader.head(newer)):
         first, second, kind = reader.take(3).tolist()
         count = reader.count()
@@ -107,7 +108,9 @@ def read_msh2(path: Path) -> Any:
     names = _names(sections.get("PhysicalNames", _Numbers(b"")).data)
     tags, points = sections["Nodes"].records(sections["Nodes"].line(), 3)
     reader = sections["Elements"]
-    total, blocks, found = reader.line(), [], []
+    total = reader.line()
+    blocks: list[tuple[int, list[np.ndarray]]] = []
+    found: list[list[np.ndarray]] = []
     while total > 0:
         kind, count, extra = reader.take(3).tolist()
         size = num_nodes_per_cell[_gmsh_to_meshio_type[kind]]
