@@ -1,5 +1,7 @@
 """What boundaries stand for: flats, arcs and surfaces between; curves that users give."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import skfem
@@ -13,6 +15,7 @@ from contactopt.meshes.local_refinement import (
     boundary_curve,
     boundary_curves,
     divide,
+    named_like,
     simplices,
     split,
 )
@@ -197,3 +200,19 @@ def test_scenes_are_halved_with_the_curves_that_they_give():
     assert part_curves(given.upper, given.upper.mesh)["outer"].known
     nodes = mesh.dofs.get_facet_dofs(mesh.boundaries["outer"]).flatten()
     assert np.abs(np.hypot(*mesh.doflocs[:, nodes]) - 20).max() < 1e-12
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_facets_of_strongly_graded_meshes_keep_their_names(dim):
+    """Near the long facets of the floor lie hundreds of small ones of the walls, with nearer centres."""
+    heights, kind = np.array([0.0, *np.geomspace(1e-6, 1, 25)]), skfem.MeshTri if dim == 2 else skfem.MeshTet
+    mesh = kind.init_tensor(*[np.array([0.0, 1.0])] * (dim - 1), heights)
+    sides = {"floor": (dim - 1, 0.0), "wall": (0, 0.0)}
+    mesh = mesh.with_boundaries(
+        {name: lambda x, i=i, at=at: np.abs(x[i] - at) < 1e-12 for name, (i, at) in sides.items()}
+    )
+    fine = named_like(mesh, replace(mesh, _boundaries=None).refined(2))
+    outer = fine.boundary_facets()
+    for name, (i, at) in sides.items():
+        flat = (np.abs(fine.p[i, fine.facets[:, outer]] - at) < 1e-12).all(axis=0)
+        assert np.array_equal(fine.boundaries[name], outer[flat])

@@ -429,3 +429,40 @@ def test_damaged_binary_files_of_second_order_end_in_a_sentence(gmsh, tmp_path, 
             load_mesh(path, "disc")
         except InputError as error:
             assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize("version", ["2.2", "4.1"])
+def test_binary_gmsh_files_are_read_as_text_ones_and_damage_ends_in_one_sentence(tmp_path, version):
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Mesh.MshFileVersion", float(version))
+        gmsh.model.occ.addDisk(0, 0, 0, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [1], name="body")
+        gmsh.model.addPhysicalGroup(1, [1], name="edge")
+        gmsh.model.mesh.generate(2)
+        gmsh.model.mesh.setOrder(2)
+        for binary in (0, 1):
+            gmsh.option.setNumber("Mesh.Binary", binary)
+            gmsh.write(str(tmp_path / f"{binary}.msh"))
+    finally:
+        gmsh.finalize()
+    text, binary = (mesh_formats.read_groups(tmp_path / f"{i}.msh") for i in (0, 1))
+    assert np.allclose(text.points, binary.points, rtol=0, atol=1e-15)
+    for (kind, nodes, _), (other, own, _) in zip(text.blocks, binary.blocks, strict=True):
+        assert kind == other and np.array_equal(nodes, own)
+    assert binary.names(2) == ["body"] and binary.names(1) == ["edge"]
+    for key, found in text.members.items():
+        assert all(np.array_equal(members, binary.members[key][i]) for i, members in found.items())
+    data, rng, refused = (tmp_path / "1.msh").read_bytes(), np.random.default_rng(0), 0
+    for trial in range(40):
+        bad = np.frombuffer(data, np.uint8).copy()
+        bad[rng.integers(30, len(bad), 5)] = rng.integers(0, 256, 5)
+        (tmp_path / "bad.msh").write_bytes(bad[: rng.integers(len(bad)) if trial % 2 else None].tobytes())
+        try:
+            mesh_formats.read_groups(tmp_path / "bad.msh")
+        except InputError as error:
+            refused += "\n" not in str(error)
+    assert refused > 20

@@ -27,7 +27,6 @@ from contactopt.meshes.given_curves import Curve as Curve
 from contactopt.meshes.mesh_repair import volumes
 
 log = logging.getLogger(__name__)
-NEAREST = 16  # old facets among which the one that holds a new facet is looked for
 FLAT = 0.1  # least share of its volume that an element keeps where its nodes move to a curve
 BENT = 0.15  # sagitta of an edge over its length, beyond which the mesh is too coarse for its curve
 SMALLEST = 1e-10  # elements are not divided below this fraction of the coordinates or of the body
@@ -295,8 +294,16 @@ def named_like(old: Any, new: Any) -> Any:
     corners = np.concatenate([old.p[:, old.facets[list(choice)][:, facets]] for choice in choices], axis=2)
     facets = np.tile(facets, len(choices))
     centres = new.p[:, new.facets[:, outer]].mean(axis=1)
-    count = min(NEAREST, len(facets))
-    near = cKDTree(corners.mean(axis=1).T).query(centres.T, k=count)[1].reshape(len(outer), count)
-    parent = facets[near[np.arange(len(outer)), np.argmin(barycentric(corners[:, :, near], centres)[1], axis=1)]]
+    middle = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - middle[:, None], axis=0).max(axis=0)
+    # A facet holds points of the ball around its corners alone, however the sizes of facets vary.
+    held = cKDTree(centres.T).query_ball_point(middle.T, radius)
+    within = np.concatenate([[0][:0], *held]).astype(int)
+    of = np.repeat(np.arange(len(facets)), [len(own) for own in held])
+    off = barycentric(corners[:, :, of, None], centres[:, within])[1][:, 0]
+    order = np.lexsort((off, within))
+    found, first = np.unique(within[order], return_index=True)
+    parent = np.full(len(outer), -1)
+    parent[found] = facets[of[order[first]]]
     names = {name: outer[np.isin(parent, members)] for name, members in old.boundaries.items()}
     return replace(new, _boundaries={name: np.sort(members).astype(np.int32) for name, members in names.items()})

@@ -21,7 +21,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.meshes.inp import read_inp
-from contactopt.meshes.msh4 import read_msh4, version
+from contactopt.meshes.msh4 import read_msh2, read_msh4, version
 
 MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
 # arrays of integers per element whose numbers are groups; those of others are named 'array=number'
@@ -35,7 +35,7 @@ TAGS = (
     "flac3d:group",
     "netgen:index",
 )
-# formats whose readers end on damaged text; others, and those of binary files, may not
+# formats whose readers end on damaged text; others may not
 SAFE = ("gmsh", "vtu", "vtk", "abaqus", "xdmf", "medit", "nastran", "med", "netgen", "avsucd")
 PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte
 MEMORY = 4_000_000_000, 50  # bytes that such a reader gets, and more per byte
@@ -143,8 +143,10 @@ def _read(path: Path) -> Any:
     stated, binary = version(path) if "gmsh" in formats else (None, False)
     if stated is not None and stated.partition(".")[0] not in ("2", "4"):
         raise InputError(f"mesh file '{path}' is of version {stated} of Gmsh's format; save it in version 4.1 or 2.2.")
-    for newer in () if binary else (False, True):  # "4" stands for either
-        if stated in (("4", "4.1") if newer else ("4", "4.0")):
+    if binary:  # meshio trusts the counts of damaged files
+        formats = ["gmsh"]
+    for newer in (False, True):  # "4" stands for either
+        if not binary and stated in (("4", "4.1") if newer else ("4", "4.0")):
             with contextlib.suppress(Exception):  # what is wrong with a damaged file is said below
                 return read_msh4(path, newer)
     for name in sorted(formats, key=lambda name: name not in SAFE):
@@ -153,8 +155,9 @@ def _read(path: Path) -> Any:
             with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
                 if name == "abaqus":
                     return read_inp(path)
-                safe = name in SAFE and not binary
-                return meshio.read(path, file_format=name) if safe else _read_apart(path, name, size)
+                if binary:
+                    return read_msh2(path) if str(stated)[0] == "2" else read_msh4(path, stated != "4.0")
+                return meshio.read(path, file_format=name) if name in SAFE else _read_apart(path, name, size)
         except (Exception, SystemExit) as error:
             text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
             said = said or " ".join(text.split())[:200] or type(error).__name__

@@ -1,7 +1,9 @@
-"""Gmsh's file formats 4.0 and 4.1 in text.
+"""Gmsh's file formats: 4.0 and 4.1, and 2.2 in binary.
 
-meshio takes 4.0 for 4.1, and reads neither where some elements belong to no group, as in files that Gmsh writes with the option
-Mesh.SaveAll. A file holds sections `$Name ... $EndName`. Entities (points, curves, surfaces, volumes) list the physical groups that
+meshio takes 4.0 for 4.1, and reads neither where some elements belong to no group, as in files
+that Gmsh writes with the option Mesh.SaveAll. From damaged binary files it takes counts as they are
+and asks for memory without bound; here no count reaches beyond its section. A file holds sections
+`$Name ... $EndName`. Entities (points, curves, surfaces, volumes) list the physical groups that
 they belong to; nodes and elements come entity by entity.
 
 Source: Gmsh reference manual, versions 4.0 and 4.15, chapter "MSH file format".
@@ -38,7 +40,7 @@ def version(path: Path) -> tuple[str | None, bool]:
 
 
 def read_msh4(path: Path, newer: bool) -> Any:
-    """Read a text file of Gmsh of version 4.0 or 4.1.
+    """Read a file of Gmsh of version 4.0 or 4.1.
 
     Parameters
     ----------
@@ -57,101 +59,211 @@ def read_msh4(path: Path, newer: bool) -> Any:
     ValueError, KeyError
         Where the file ends early or does not keep to the format.
     """
-    import meshio
     from meshio._common import num_nodes_per_cell
-    from meshio.gmsh.common import _gmsh_to_meshio_order, _gmsh_to_meshio_type
+    from meshio.gmsh.common import _gmsh_to_meshio_type
 
     sections = _sections(path)
-    groups = _groups(sections.get("Entities", []), _names(sections.get("PhysicalNames", [])), newer)
-    tags, points = _nodes(_Numbers(sections["Nodes"]), newer)
-    number = {tag: place for place, tag in enumerate(tags)}
-    blocks: list[tuple[str, np.ndarray]] = []
+    names = _names(sections.get("PhysicalNames", _Numbers(b"")).data)
+    groups = _groups(sections.get("Entities"), names, newer)
+    tags, points = _nodes(sections["Nodes"], newer)
+    reader = sections["Elements"]
+    blocks: list[tuple[int, np.ndarray]] = []
     members: list[list[str]] = []
-    reader = _Numbers(sections["Elements"])
     for _ in range(reader.head(newer)):
-        first, second, kind, count = reader.take(4)
-        name = _gmsh_to_meshio_type[kind]
-        rows = reader.take(count * (1 + num_nodes_per_cell[name])).reshape(count, -1)[:, 1:]
-        nodes = np.array([number[tag] for tag in rows.ravel().tolist()]).reshape(rows.shape)
-        blocks.append((name, _gmsh_to_meshio_order(name, nodes)))
+        first, second, kind = reader.take(3).tolist()
+        count = reader.count()
+        width = 1 + num_nodes_per_cell[_gmsh_to_meshio_type[kind]]
+        rows = reader.take(count * width, "u8" if newer else "i4").reshape(count, width)
+        blocks.append((kind, rows[:, 1:]))
         members.append(groups.get((first, second) if newer else (second, first), []))
     sets = {
         group: [np.arange(len(nodes) if group in own else 0) for (_, nodes), own in zip(blocks, members)]
         for group in sorted({group for own in members for group in own})
     }
-    return meshio.Mesh(points, blocks, cell_sets=sets)
+    return _mesh(points, tags, blocks, sets)
+
+
+def read_msh2(path: Path) -> Any:
+    """Read a binary file of Gmsh of version 2.2.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    meshio.Mesh
+        The mesh, with the physical groups as sets of elements by name.
+
+    Raises
+    ------
+    ValueError, KeyError
+        Where the file ends early or does not keep to the format.
+    """
+    from meshio._common import num_nodes_per_cell
+    from meshio.gmsh.common import _gmsh_to_meshio_type
+
+    sections = _sections(path)
+    names = _names(sections.get("PhysicalNames", _Numbers(b"")).data)
+    tags, points = sections["Nodes"].records(sections["Nodes"].line(), 3)
+    reader = sections["Elements"]
+    total = reader.line()
+    blocks: list[tuple[int, list[np.ndarray]]] = []
+    found: list[list[np.ndarray]] = []
+    while total > 0:
+        kind, count, extra = reader.take(3).tolist()
+        size = num_nodes_per_cell[_gmsh_to_meshio_type[kind]]
+        if not 0 < count <= total or extra < 0:
+            raise ValueError(f"a block of {count} elements with {extra} tags")
+        total -= count
+        rows = reader.take(count * (1 + extra + size)).reshape(count, -1)
+        groups = rows[:, 1] if extra else np.zeros(count, dtype=np.int64)
+        if blocks and blocks[-1][0] == kind:
+            blocks[-1][1].append(rows[:, 1 + extra :])
+            found[-1].append(groups)
+        else:
+            blocks.append((kind, [rows[:, 1 + extra :]]))
+            found.append([groups])
+    joined = [(kind, np.concatenate(rows)) for kind, rows in blocks]
+    sets: dict[str, list[np.ndarray]] = {}
+    for i, groups in enumerate(np.concatenate(parts) for parts in found):
+        for tag in np.unique(groups[groups != 0]):
+            dim = _DIMENSION[_gmsh_to_meshio_type[blocks[i][0]].rstrip("0123456789")]
+            own = sets.setdefault(names.get((dim, int(tag)), str(tag)), [np.arange(0)] * len(blocks))
+            own[i] = np.flatnonzero(groups == tag)
+    return _mesh(points, tags, joined, sets)
+
+
+_DIMENSION = {"vertex": 0, "line": 1, "triangle": 2, "quad": 2}
+_DIMENSION |= dict.fromkeys(("tetra", "hexahedron", "wedge", "pyramid"), 3)
+
+
+def _mesh(points: np.ndarray, tags: np.ndarray, blocks: list, sets: dict) -> Any:
+    """The mesh of blocks of (kind of Gmsh, tags of the nodes of each element)."""
+    import meshio
+    from meshio.gmsh.common import _gmsh_to_meshio_order, _gmsh_to_meshio_type
+
+    order = np.argsort(tags, kind="stable")
+    cells = []
+    for kind, rows in blocks:
+        place = np.searchsorted(tags, rows, sorter=order)
+        if rows.size and (place.max() == len(tags) or (tags[order[place]] != rows).any()):
+            raise ValueError("an element names a node that is not there")
+        name = _gmsh_to_meshio_type[kind]
+        cells.append((name, _gmsh_to_meshio_order(name, order[place])))
+    return meshio.Mesh(points, cells, cell_sets=sets)
 
 
 class _Numbers:
-    """The numbers of a section, taken one after the other."""
+    """The numbers of a section in text, taken one after the other."""
 
-    def __init__(self, lines: list[str]) -> None:
-        self.words, self.place = " ".join(lines).split(), 0
+    def __init__(self, data: bytes) -> None:
+        self.data, self.words, self.place = data, data.split(), 0
 
-    def words_of(self, count: int) -> list[str]:
+    def take(self, count: int, kind: str = "i4") -> np.ndarray:
+        """As many numbers of a kind, integers of 64 or 'f8' of 64 bits."""
         first, self.place = self.place, self.place + count
-        if self.place > len(self.words):
+        if count < 0 or self.place > len(self.words):
             raise ValueError("a section ends early")
-        return self.words[first : self.place]
+        values = np.array(self.words[first : self.place], dtype=float)
+        return values if kind == "f8" else values.astype(np.int64)
 
-    def take(self, count: int) -> np.ndarray:
-        return np.array(self.words_of(count), dtype=float).astype(np.int64)
+    def count(self) -> int:
+        return int(self.take(1, "u8")[0])
+
+    def records(self, count: int, width: int) -> tuple[np.ndarray, np.ndarray]:
+        """Of each of `count` records its integer and its `width` numbers."""
+        rows = self.take(count * (1 + width), "f8").reshape(count, 1 + width)
+        return rows[:, 0].astype(np.int64), rows[:, 1:]
 
     def head(self, newer: bool) -> int:
-        """The number of entities of a section of nodes or elements; their total, and the range of tags, are passed over."""
-        return int(self.take(4 if newer else 2)[0])
+        """The number of entities of a section; their total, and the range of tags, are passed over."""
+        return int(self.take(4 if newer else 2, "u8")[0])
 
 
-def _sections(path: Path) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
-    name = None
-    for line in path.read_text(errors="replace").splitlines():
-        if line.startswith("$End"):
-            name = None
-        elif line.startswith("$"):
-            name = line[1:].strip()
-            found[name] = []
-        elif name is not None:
-            found[name].append(line)
-    for needed in ("Nodes", "Elements"):
-        if needed not in found:
-            raise ValueError(f"it has no section ${needed}")
+class _Bytes(_Numbers):
+    """The same of a section in binary."""
+
+    def __init__(self, data: bytes, order: str) -> None:
+        self.data, self.order, self.place = data, order, 0
+
+    def _read(self, count: int, dtype: np.dtype) -> np.ndarray:
+        first, self.place = self.place, self.place + count * dtype.itemsize
+        if count < 0 or self.place > len(self.data):
+            raise ValueError("a section ends early")
+        return np.frombuffer(self.data, dtype, count, first)
+
+    def take(self, count: int, kind: str = "i4") -> np.ndarray:
+        values = self._read(count, np.dtype(self.order + kind))
+        return values.astype(float if kind == "f8" else np.int64)
+
+    def records(self, count: int, width: int) -> tuple[np.ndarray, np.ndarray]:
+        dtype = np.dtype([("tag", self.order + "i4"), ("x", self.order + "f8", (width,))])
+        rows = self._read(count, dtype)
+        return rows["tag"].astype(np.int64), rows["x"].astype(float)
+
+    def line(self) -> int:
+        """The count that version 2.2 writes as text before the numbers."""
+        self.place = self.data.index(b"\n") + 1
+        return int(self.data[: self.place])
+
+
+def _sections(path: Path) -> dict[str, Any]:
+    """The sections, from which numbers can be taken."""
+    data, binary = path.read_bytes(), version(path)[1]
+    found: dict[str, Any] = {}
+    one = data[data.index(b"\n", data.index(b"$MeshFormat") + 12) + 1 :][:4]
+    order = ">" if one == b"\0\0\0\1" else "<"
+    if binary and data.split(maxsplit=4)[3] != b"8":
+        raise ValueError("its numbers are not of eight bytes")
+    for name in ("PhysicalNames", "Entities", "Nodes", "Elements"):
+        start = data.find(f"${name}".encode())
+        if start >= 0:
+            start = data.index(b"\n", start) + 1
+            end = data.find(f"$End{name}".encode(), start)
+            part = data[start : end if end >= 0 else None]
+            in_text = name == "PhysicalNames" or not binary
+            found[name] = _Numbers(part) if in_text else _Bytes(part, order)
+        elif name in ("Nodes", "Elements"):
+            raise ValueError(f"it has no section ${name}")
     return found
 
 
-def _names(lines: list[str]) -> dict[tuple[int, int], str]:
+def _names(data: bytes) -> dict[tuple[int, int], str]:
     """(dimension, number) -> name of physical groups."""
+    lines = data.decode(errors="replace").splitlines()
     rows = [shlex.split(line) for line in lines[1:] if line.strip()]
     return {(int(dim), int(tag)): name for dim, tag, name in rows}
 
 
-def _groups(lines: list[str], names: dict[tuple[int, int], str], newer: bool) -> dict[tuple[int, int], list[str]]:
-    """(dimension, entity) -> names of the physical groups that it belongs to; a group without a name has its number."""
+def _groups(reader: Any, names: dict, newer: bool) -> dict[tuple[int, int], list[str]]:
+    """(dimension, entity) -> names of its physical groups; a group without a name has its number."""
     found = {}
-    if lines:
-        reader = _Numbers(lines)
-        for dim, count in enumerate(reader.take(4)):
+    if reader is not None:
+        for dim, count in enumerate(reader.take(4, "u8").tolist()):
             for _ in range(count):
                 entity = int(reader.take(1)[0])
-                reader.words_of(3 if newer and dim == 0 else 6)  # its place, or the box around it
-                tags = np.abs(reader.take(reader.take(1)[0]))
+                reader.take(3 if newer and dim == 0 else 6, "f8")  # its place, or the box around it
+                tags = np.abs(reader.take(reader.count()))
                 found[dim, entity] = [names.get((dim, int(tag)), str(tag)) for tag in tags]
                 if dim:
-                    reader.words_of(int(reader.take(1)[0]))  # what bounds it
+                    reader.take(reader.count())  # what bounds it
     return found
 
 
-def _nodes(reader: _Numbers, newer: bool) -> tuple[list[int], np.ndarray]:
-    """Numbers of the nodes and their places (n, 3)."""
-    tags, points = [], []
+def _nodes(reader: Any, newer: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Tags of the nodes (n,) and their places (n, 3)."""
+    tags, points = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
     for _ in range(reader.head(newer)):
-        first, second, parametric, count = reader.take(4)
-        extra = int((first if newer else second) if parametric else 0)  # parameters on the entity
-        width = 3 + extra if newer else 4 + extra
+        first, second, parametric = reader.take(3).tolist()
+        width = 3 + ((first if newer else second) if parametric else 0)  # parameters on the entity
+        count = reader.count()
         if newer:
-            tags += reader.take(count).tolist()
-        rows = np.array(reader.words_of(int(count) * width), dtype=float).reshape(count, width)
-        if not newer:
-            tags += rows[:, 0].astype(np.int64).tolist()
-        points.append(rows[:, :3] if newer else rows[:, 1:4])
-    return tags, np.concatenate(points) if points else np.zeros((0, 3))
+            own = reader.take(count, "u8")
+            rows = reader.take(count * width, "f8").reshape(count, width)
+        else:
+            own, rows = reader.records(count, width)
+        tags.append(own)
+        points.append(rows[:, :3])
+    return np.concatenate(tags), np.concatenate(points)
