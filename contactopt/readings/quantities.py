@@ -200,7 +200,8 @@ def _fitted_top(
     """
     count, places = FITTED[problem.dim], len(_surroundings(problem)[1])
     narrowest = _fit_to(count, problem, pressure, usable, top)
-    found, (value, doubt) = [], narrowest[:2]
+    found: list[tuple[float, float]] = []
+    value, doubt = narrowest[:2]
     while np.isfinite(doubt) and all(abs(value - other) <= around for other, around in found):
         found.append((value, doubt))
         count *= 2
