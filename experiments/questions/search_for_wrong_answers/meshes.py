@@ -182,9 +182,12 @@ class Move:
         return lambda x: self.length * (self.R @ curve(self.R.T @ x / self.length))
 
     def scene(self, scene: Scene) -> Scene:
-        """All bodies of a scene of meshes in the long form, moved."""
+        """All bodies of a scene of meshes in the long form, moved. The friction of Tresca's law is a stress."""
         bodies = tuple(self.part(part, scene.components) for part in scene.bodies)
-        return replace(scene, bodies=bodies, thickness=scene.thickness * self.length)
+        contacts = tuple(
+            replace(pair, mu=pair.mu * self.stress) if pair.law == "tresca" else pair for pair in scene.contacts
+        )
+        return replace(scene, bodies=bodies, contacts=contacts, thickness=scene.thickness * self.length)
 
 
 def random_move(rng: np.random.Generator, scene: Scene, swapped: bool = False) -> Move:
