@@ -202,7 +202,7 @@ def _fitted_top(
     narrowest = _fit_to(count, problem, pressure, usable, top)
     found: list[tuple[float, float]] = []
     value, doubt = narrowest[:2]
-    while np.isfinite(doubt) and all(abs(value - other) <= around for other, around in found):
+    while np.isfinite(doubt) and all(abs(value - other) <= doubt + around for other, around in found):
         found.append((value, doubt))
         count *= 2
         if count > places:
@@ -238,6 +238,9 @@ def _fit_to(
     value = max(value, _stationary(fit, powers, len(places)) or 0.0) if not _outermost(offset[:, near]) else nodal
     scatter = float(np.sqrt(np.sum(left**2) / (len(near) - len(powers))))
     at_top = abs(float(fit[0]) - nodal**2) if usable[top] else 0.0
+    at_top *= min(
+        1.0, float(np.sqrt(problem.areas[top] / problem.areas[node[near]].mean()))
+    )  # rings at an axis bear little
     return value, max(scatter, at_top) / (2 * value or 1.0), own, size
 
 
