@@ -195,17 +195,19 @@ def _fitted_top(
 ) -> tuple[float, float, np.ndarray, float]:
     """Value and uncertainty of the pressure near a node, the contacts next to it, and their distance.
 
-    The value is that of the widest fit that agrees with all narrower ones within their uncertainties: a smooth
-    pressure is read from many contacts, a narrow peak from the few that it has (after Lepski).
+    Beside an axis the value is that of the widest fit that agrees with all narrower ones within their uncertainties
+    (after Lepski): the nodes next to the axis are poor, and those farther away mend a smooth pressure.
     """
-    count, places = FITTED[problem.dim], len(_surroundings(problem)[1])
+    count, widest = FITTED[problem.dim], 0
+    if np.any((problem.areas > 0) & ~usable):  # nodes on an axis, whose neighbours are poor, too
+        widest = len(_surroundings(problem)[1])
     narrowest = _fit_to(count, problem, pressure, usable, top)
     found: list[tuple[float, float]] = []
     value, doubt = narrowest[:2]
     while np.isfinite(doubt) and all(abs(value - other) <= doubt + around for other, around in found):
         found.append((value, doubt))
         count *= 2
-        if count > places:
+        if count > widest:
             break
         value, doubt = _fit_to(count, problem, pressure, usable, top)[:2]
     return *(found[-1] if found else (narrowest[0], narrowest[0])), *narrowest[2:]
