@@ -24,20 +24,20 @@ from experiments.questions.granular import packing  # noqa: E402
 from experiments.questions.robustness import rigid_bodies  # noqa: E402
 from experiments.report import write  # noqa: E402
 
-HOME = "contactopt.solving"
+HOME = "contactopt.methods"
 USERS = {  # names of constants -> module that uses them, method that is run, kinds of problems that feel them
     (
         "NEWTON_STEPS PATIENCE PROGRESS CONE_PROGRAMS CLOSE LEAST_ALPHA POLISH ROUND SPARSE_ROUND PATHS TURNING GENTLE_ALPHA LARGER"
     ): (
-        "methods.auto",
+        "auto",
         "auto",
         ("elastic", "rigid", "packing"),
     ),
-    "FALL RISE GENTLE_FALL GENTLE_RISE EASY": ("methods.proximal", "proximal", ("elastic", "rigid")),
+    "FALL RISE GENTLE_FALL GENTLE_RISE EASY": ("proximal", "proximal", ("elastic", "rigid")),
     "SUBPROBLEM_STEPS SHORTEST MEMORY ENOUGH": ("kernels.sparse_newton", "proximal", ("elastic", "rigid")),
     "LOOSE": ("kernels.alart_curnier", "newton", ("elastic",)),
     "SMALL FULL": ("kernels.sparse_blocks", "auto", ("packing",)),
-    "SHARPER SHARPEST": ("methods.apg", "apg", ("coarse",)),
+    "SHARPER SHARPEST": ("apg", "apg", ("coarse",)),
     (
         "FRICTIONLESS ROUGHEST INTERIOR_STEPS STALLED INTERIOR_PROGRESS START LEAST_SMOOTHING MOST_SMOOTHING PREDICTED "
         "BOUNDARY SHORT STUCK CORRECTED LEAST_CENTERING MOST_CENTERING STUCK_CENTERING CENTRAL CENTRAL_KEPT BACKTRACK"
@@ -47,19 +47,19 @@ USERS = {  # names of constants -> module that uses them, method that is run, ki
     "SLIPPING": ("kernels.linearised", "newton", ("products",)),
     "ACTIVE_SETS SUCCESS WEIGHT_FALL WEIGHT_RISE": ("kernels.subproblems", "pcg", ("products",)),
     "COUPLED_FIRST COUPLED_LOOSEST COUPLED_TIGHTEST SCHUR_STEP SCHUR_MARGIN": (
-        "kernels.coupled",
+        "kernels.coupled_newton",
         "newton",
         ("bodies",),
     ),
     "COARSEST LEAST_SYMBOL LEAST_DETERMINANT FIRST_SHIFT SHIFT_RATIO": ("kernels.levels", "nested", ("half-spaces",)),
     "NESTED_LOOSEST NESTED_TIGHTEST COARSE_ENOUGH COARSEST_ENOUGH COARSE_STEPS": (
-        "methods.nested",
+        "nested",
         "nested",
         ("half-spaces",),
     ),
     "EIGENVALUE_MARGIN ROWS_FALL ROWS_SHARE FINEST_SHARE STIFFER": ("kernels.mprgp", "lagrangian", ("coarse",)),
-    "ROUGH_NORMAL": ("methods.lagrangian", "lagrangian", ("coarse",)),
-    "FIRST_BALANCING MOST_CHANGE LEAST_CHANGE": ("methods.admm", "admm", ("coarse",)),
+    "ROUGH_NORMAL": ("lagrangian", "lagrangian", ("coarse",)),
+    "FIRST_BALANCING MOST_CHANGE LEAST_CHANGE": ("admm", "admm", ("coarse",)),
 }
 # methods with settings, or without a name of their own
 BUILT = {"pcg": find_method("alternating", normal="pcg", tangential="pcg"), "nested": Nested()}
